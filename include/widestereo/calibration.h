@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "widestereo/rig.h"
+
+namespace widestereo {
+
+/// Calibration file formats, told apart by content, never by file name.
+enum class CalibrationFormat { kalibr, basalt, opencv };
+
+struct Calibration {
+  Rig rig;  ///< view 0's camera frame is the world frame
+  CalibrationFormat format = CalibrationFormat::kalibr;
+};
+
+/// Reads a Kalibr camchain YAML, a Basalt JSON or an OpenCV FileStorage (YAML, XML or JSON; fisheye
+/// stereo or omnidir) and validates it. Sizes come from the file; OpenCV files without an image size
+/// take `image_size` (pixels), which is otherwise ignored when empty and checked when given.
+/// Throws Error naming the file, the key and the remedy.
+Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
+
+/// Writes a Kalibr camchain (with the extra key max_theta_deg where the field of view is limited).
+/// Throws Error when a camera has no Kalibr form (skew, k3) or the file cannot be written.
+void write_kalibr(const std::filesystem::path& path, const Rig& rig);
+
+/// Writes a Basalt JSON. Throws Error when a camera has no Basalt form or the file cannot be written.
+void write_basalt(const std::filesystem::path& path, const Rig& rig);
+
+}  // namespace widestereo

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace widestereo {
+
+enum class DeviceKind { cpu, vulkan };
+
+struct DeviceInfo {
+  DeviceKind kind = DeviceKind::cpu;
+  std::string id;      ///< what Device::open takes: "cpu", "vulkan:0"
+  std::string name;    ///< as the driver says
+  std::string type;    ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu"
+  std::string driver;  ///< name and version, where known
+  std::string uuid;    ///< 32 hexadecimal digits, empty for the CPU
+  std::string unusable;  ///< why the device cannot be used, empty if it can
+};
+
+struct DeviceRequest {
+  /// "auto" (the best Vulkan device, else the CPU), "cpu", "vulkan", "vulkan:INDEX", "vulkan:NAME PART",
+  /// "vulkan:UUID".
+  std::string device = "auto";
+  bool validation = false;  ///< Vulkan: validation layers with synchronization validation
+  std::string pipeline_cache;  ///< Vulkan: file that keeps compiled pipelines between runs, empty for none
+  /// Vulkan: longest dispatch in patch samples, so that slow devices answer within watchdog limits;
+  /// 0 chooses by device type. The result does not depend on it.
+  long max_samples_per_dispatch = 0;
+};
+
+/// A compute device. Owns its handles; movable, not thread-safe; devices are independent of each other.
+class Device {
+ public:
+  static Device open(const DeviceRequest& request);
+  static Device open(const std::string& device) { return open(DeviceRequest{.device = device}); }
+  /// All devices of this machine, best first, the CPU last. Never throws for a missing driver.
+  static std::vector<DeviceInfo> list();
+
+  ~Device();
+  Device(Device&&) noexcept;
+  Device& operator=(Device&&) noexcept;
+
+  const DeviceInfo& info() const;
+  /// What `auto` passed over and why, for the user; empty if nothing.
+  const std::string& note() const;
+  /// Messages of the validation layers so far (errors and warnings).
+  std::vector<std::string> validation_messages() const;
+
+  class Implementation;  // src/matching/device_implementation.h
+  explicit Device(std::unique_ptr<Implementation> implementation);
+  Implementation& implementation() const { return *implementation_; }
+
+ private:
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace widestereo

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "widestereo/camera.h"
+
+namespace widestereo {
+
+/// One calibrated camera of a rig.
+struct View {
+  std::string name;                    ///< "cam0", ... as in the calibration file
+  Camera camera;
+  Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();  ///< metres
+  cv::Mat mask;                        ///< empty, or CV_8UC1 of the camera's size, 0 = excluded
+};
+
+/// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a file).
+struct Rig {
+  std::vector<View> views;
+};
+
+/// Pose of view `source` relative to view `reference`: X_source = T X_reference.
+inline Eigen::Isometry3d source_from_reference(const View& source, const View& reference) {
+  return source.world_from_camera.inverse() * reference.world_from_camera;
+}
+
+/// Distance between two camera centres in metres.
+inline double baseline(const View& a, const View& b) {
+  return (a.world_from_camera.translation() - b.world_from_camera.translation()).norm();
+}
+
+/// Throws Error unless every camera is valid, every pose is rigid and finite, masks fit and no two
+/// views share a centre. `name` (a file, say) begins the message.
+void validate(const Rig& rig, const std::string& name);
+
+}  // namespace widestereo

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// What the host tells the kernels: one block for a match, one small block for a dispatch.
+
+#define MAX_VIEWS 8
+
+// X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
+struct ViewPair {
+  vec4 row0;
+  vec4 row1;
+  vec4 row2;
+};
+
+// std140 uniform block.
+struct MatchParameters {
+  vec4 range;         // min and max distance (m), min and max inverse distance (1/m)
+  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; unused
+  vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
+  ivec4 search;       // distance sampling, refinements, best sources, number of views
+  CameraParameters cameras[MAX_VIEWS];
+  ViewPair pairs[MAX_VIEWS * MAX_VIEWS];  // [reference * MAX_VIEWS + source]: source from reference
+};
+
+// Push constants.
+struct PassParameters {
+  int reference;   // view whose pixels are updated
+  uint sources;    // bit j: view j is a source
+  int other;       // the one view that a transfer reads from
+  int iteration;   // counts over the whole schedule of this view
+  int colour;      // 0, 1: checkerboard; -1: all pixels
+  int neighbours;  // bits: left, right, up, down
+  uint seed;
+  int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
+  int last_row;    // one past the last
+};

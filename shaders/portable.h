@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// Lets glslang, nvcc and g++ compile the same kernel source. Rules of the subset: float literals with
+// f, no swizzles, no array parameters, float(i) casts, OUT(T) instead of out, everything an accessor
+// or a launch needs passed behind CONTEXT (nothing in GLSL, a reference in C++ and CUDA).
+//
+// A back end provides, before including the algorithm:
+//   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
+//   float intensity_at(view, pixel)         [0, 1], negative where masked
+//   vec4  intensity_taps(view, pixel)       of pixel, its right, lower and lower right neighbour
+//   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
+//   ... and the blocks PARAMETERS and PASS of parameters.glsl.
+#ifndef WIDESTEREO_PORTABLE_H
+#define WIDESTEREO_PORTABLE_H
+
+#ifdef __cplusplus
+
+#ifdef __CUDACC__
+#define FN __host__ __device__
+#else
+#define FN
+#endif
+#define OUT(T) T&
+#define CONTEXT context,
+#define CONTEXT_ONLY context
+#define CONTEXT_ARGUMENT const Context &context,
+#define CONTEXT_ARGUMENT_ONLY const Context &context
+#define PARAMETERS context.parameters
+#define PASS context.pass
+
+#include <math.h>
+#include <string.h>
+
+#else
+
+#define FN
+#define inline
+#define OUT(T) out T
+#define CONTEXT
+#define CONTEXT_ONLY
+#define CONTEXT_ARGUMENT
+#define CONTEXT_ARGUMENT_ONLY
+#define PARAMETERS parameters
+#define PASS pass
+#define real float
+#define real2 vec2
+#define real3 vec3
+#define real4 vec4
+#define uint_as_float(a) uintBitsToFloat(a)
+#define float_as_uint(a) floatBitsToUint(a)
+
+#endif
+
+#endif

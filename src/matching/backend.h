@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// What a back end must provide: memory, images and launching; no algorithm.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "schedule/schedule.h"
+#include "widestereo/matcher.h"
+
+namespace widestereo {
+
+/// Memory and kernels for matches of fixed sizes on one device. All maps have their view's size.
+class Backend {
+ public:
+  virtual ~Backend() = default;
+  /// Unit rays, CV_32FC4 as from ray_image(); set once.
+  virtual void set_rays(int view, const cv::Mat& rays) = 0;
+  /// Intensities in [0, 1], CV_32FC1, negative where masked; before every run.
+  virtual void set_intensity(int view, const cv::Mat& intensity) = 0;
+  /// Runs the dispatches in order and waits for them. `progress` may be empty.
+  virtual void run(const Schedule& schedule, const Matcher::Progress& progress) = 0;
+  /// Plane hypotheses (m, cost), CV_32FC4.
+  virtual cv::Mat hypotheses(int view) = 0;
+  virtual void set_hypotheses(int view, const cv::Mat& hypotheses) = 0;
+  /// What the check kernel wrote, CV_32FC4: relative difference, displacement (px), confidence, reason bits.
+  virtual cv::Mat checks(int view) = 0;
+  /// Device time per kernel of the last run.
+  virtual std::vector<KernelTime> times() const = 0;
+  virtual std::size_t device_bytes() const = 0;
+};
+
+/// A device of any kind, behind the public handle.
+class Device::Implementation {
+ public:
+  virtual ~Implementation() = default;
+  /// Throws Error when memory or a feature is missing. `sizes`: of each view's image.
+  virtual std::unique_ptr<Backend> make_backend(const std::vector<cv::Size>& sizes,
+                                                const KernelConstants& constants) = 0;
+  virtual std::vector<std::string> validation_messages() const { return {}; }
+  DeviceInfo info;
+  std::string note;
+};
+
+}  // namespace widestereo

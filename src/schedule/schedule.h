@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// The order of kernels, once for all back ends: a list of dispatches without read-back.
+#pragma once
+
+#include <vector>
+
+#include "kernel/host.h"
+#include "widestereo/options.h"
+#include "widestereo/rig.h"
+
+namespace widestereo {
+
+/// Every kernel; each has one entry point per back end, named as to_string() says (shaders/NAME.comp).
+enum class Kernel {
+  initialise,        ///< random planes of a view and their cost
+  iterate,           ///< one colour: candidates of the neighbours, then random refinements
+  iterate_raster,    ///< the same, sequentially in raster order (CPU back end only)
+  transfer_clear,    ///< empties the transfer buffers of a view
+  transfer_nearest,  ///< forward-warps another view's planes: nearest inverse distance per pixel
+  transfer_winner,   ///< ... smallest pixel index among the nearest ones
+  transfer_gather,   ///< ... takes over the winner's plane, or a random one where there is none
+  check,             ///< consistency, reasons and confidence of a view
+};
+inline constexpr int kernel_count = 8;
+const char* to_string(Kernel kernel);
+
+/// Constants compiled into a back end's kernels (specialisation constants, template arguments).
+struct KernelConstants {
+  int source_model = -1;  ///< the sources' camera model when all agree, else -1
+  int window_radius = 5;
+  int warp = 0;
+  int view_count = 2;
+  bool operator==(const KernelConstants&) const = default;
+};
+
+/// One launch over all pixels of view `pass.reference`. Writes of one dispatch are visible to the next.
+struct Dispatch {
+  Kernel kernel = Kernel::initialise;
+  kernel::PassParameters pass{};
+  int width = 0;             ///< pixels of the reference view
+  int height = 0;
+  long long samples = 0;     ///< patch samples at full windows, for splitting and progress
+};
+
+struct Schedule {
+  KernelConstants constants;
+  kernel::MatchParameters parameters{};
+  std::vector<Dispatch> dispatches;
+};
+
+/// Throws Error when rig or options are invalid, or there are fewer than 2 or more than MAX_VIEWS views.
+Schedule make_schedule(const Rig& rig, const Options& options);
+
+}  // namespace widestereo
