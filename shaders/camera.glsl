@@ -26,7 +26,7 @@ struct CameraParameters {
 };
 
 // Brown-Conrady distortion of a point on the normalised plane.
-FN inline real2 distort(CameraParameters camera, real x, real y, real q) {
+FN real2 distort(CameraParameters camera, real x, real y, real q) {
   real radial = real(1) + q * (camera.distortion.x +
                                q * (camera.distortion.y + q * camera.domain.w));
   real p1 = camera.distortion.z;
@@ -37,7 +37,7 @@ FN inline real2 distort(CameraParameters camera, real x, real y, real q) {
 
 // Projects a direction of any positive length. `model` repeats camera.size.z so that a caller can pass a
 // compile-time constant. Returns false outside the model's domain or the field of view.
-FN inline bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
+FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
   real rho2 = point.x * point.x + point.y * point.y;
   real d = sqrt(rho2 + point.z * point.z);
   bool inside = d > real(0) && point.z >= camera.domain.x * d;

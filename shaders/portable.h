@@ -15,9 +15,9 @@
 #ifdef __cplusplus
 
 #ifdef __CUDACC__
-#define FN __host__ __device__
+#define FN __host__ __device__ inline
 #else
-#define FN
+#define FN inline
 #endif
 #define OUT(T) T&
 #define CONTEXT context,
@@ -33,7 +33,6 @@
 #else
 
 #define FN
-#define inline
 #define OUT(T) out T
 #define CONTEXT
 #define CONTEXT_ONLY

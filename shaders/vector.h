@@ -52,17 +52,17 @@ FN Vector3<T> cross(Vector3<T> a, Vector3<T> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-FN inline float sqrt(float a) { return ::sqrtf(a); }
-FN inline double sqrt(double a) { return ::sqrt(a); }
-FN inline float sin(float a) { return ::sinf(a); }
-FN inline float cos(float a) { return ::cosf(a); }
-FN inline float exp(float a) { return ::expf(a); }
-FN inline float floor(float a) { return ::floorf(a); }
-FN inline float atan(float y, float x) { return ::atan2f(y, x); }
-FN inline double atan(double y, double x) { return ::atan2(y, x); }
-FN inline float abs(float a) { return ::fabsf(a); }
-FN inline double abs(double a) { return ::fabs(a); }
-FN inline int abs(int a) { return a < 0 ? -a : a; }
+FN float sqrt(float a) { return ::sqrtf(a); }
+FN double sqrt(double a) { return ::sqrt(a); }
+FN float sin(float a) { return ::sinf(a); }
+FN float cos(float a) { return ::cosf(a); }
+FN float exp(float a) { return ::expf(a); }
+FN float floor(float a) { return ::floorf(a); }
+FN float atan(float y, float x) { return ::atan2f(y, x); }
+FN double atan(double y, double x) { return ::atan2(y, x); }
+FN float abs(float a) { return ::fabsf(a); }
+FN double abs(double a) { return ::fabs(a); }
+FN int abs(int a) { return a < 0 ? -a : a; }
 template <class T>
 FN T min(T a, T b) { return b < a ? b : a; }
 template <class T>
@@ -73,12 +73,12 @@ template <class T>
 FN T length(Vector3<T> a) { return sqrt(dot(a, a)); }
 template <class T>
 FN T length(Vector2<T> a) { return sqrt(dot(a, a)); }
-FN inline float uint_as_float(uint a) {
+FN float uint_as_float(uint a) {
   float f;
   memcpy(&f, &a, sizeof f);
   return f;
 }
-FN inline uint float_as_uint(float a) {
+FN uint float_as_uint(float a) {
   uint u;
   memcpy(&u, &a, sizeof u);
   return u;

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+// Matching cost of a plane hypothesis: the reference pixel's patch is mapped through the plane into each
+// source image with the source's real camera model and compared by ZNCC.
+
+#define INVALID_COST 2.0f
+#define NO_INFORMATION_COST 1.0f
+
+#define WARP_EXACT 0
+#define WARP_AFFINE 1
+#define WARP_QUADRATIC 2
+
+FN bool in_image(ivec4 size, ivec2 pixel) {
+  return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
+}
+
+// Bilinear intensity with exact weights; false outside the image or next to a masked pixel.
+FN bool sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 position, OUT(float) intensity) {
+  intensity = 0.0f;
+  bool inside = position.x >= 0.0f && position.y >= 0.0f && position.x <= float(size.x - 1) &&
+                position.y <= float(size.y - 1);
+  if (!inside) return false;
+  ivec2 corner = ivec2(min(int(position.x), size.x - 2), min(int(position.y), size.y - 2));
+  float fx = position.x - float(corner.x);
+  float fy = position.y - float(corner.y);
+  vec4 taps = intensity_taps(CONTEXT view, corner);
+  float top = taps.x + fx * (taps.y - taps.x);
+  float bottom = taps.z + fx * (taps.w - taps.z);
+  intensity = top + fy * (bottom - top);
+  return min(min(taps.x, taps.y), min(taps.z, taps.w)) >= 0.0f;
+}
+
+// Projects the plane's point on one reference ray into a source; false where the plane is not in front.
+FN bool warp_ray(ViewPair pair, CameraParameters camera, int model, vec3 m, vec3 ray,
+                 OUT(vec2) position) {
+  float w = dot(m, ray);
+  bool inside = project(camera, model, direction_in_source(pair, ray, w), position);
+  return inside && w > 0.0f;
+}
+
+FN bool warp_pixel(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, vec3 m,
+                   ivec2 pixel, OUT(vec2) position) {
+  position = vec2(0.0f, 0.0f);
+  if (!in_image(PARAMETERS.cameras[PASS.reference].size, pixel)) return false;
+  vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (dot(vec3(ray.x, ray.y, ray.z), vec3(ray.x, ray.y, ray.z)) == 0.0f) return false;
+  return warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position);
+}
+
+// Second-order map of pixel offsets into the source: u = u0 + x ux + y uy + x^2 uxx + x y uxy + y^2 uyy.
+struct PatchMap {
+  vec2 u0;
+  vec2 ux;
+  vec2 uy;
+  vec2 uxx;
+  vec2 uxy;
+  vec2 uyy;
+};
+
+// One axis of the map from the projections of -r, 0 and +r; at an image border one side is enough.
+FN bool map_axis(vec2 centre, bool has_low, vec2 low, bool has_high, vec2 high, float r,
+                 OUT(vec2) slope, OUT(vec2) curvature) {
+  curvature = vec2(0.0f, 0.0f);
+  slope = vec2(0.0f, 0.0f);
+  if (has_low && has_high) {
+    slope = (0.5f / r) * (high - low);
+    if (WARP == WARP_QUADRATIC) {
+      curvature = (0.5f / (r * r)) * ((high - centre) - (centre - low));
+    }
+    return true;
+  }
+  if (has_high) slope = (1.0f / r) * (high - centre);
+  if (has_low) slope = (1.0f / r) * (centre - low);
+  return has_high || has_low;
+}
+
+// Fits the map to exactly projected anchors: the centre, the ends of both axes and, for the quadratic
+// warp, the corners. False where an axis has no anchor.
+FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, vec3 m,
+                  ivec2 pixel, vec2 centre, OUT(PatchMap) map) {
+  int r = WINDOW_RADIUS;
+  map.u0 = centre;
+  map.uxy = vec2(0.0f, 0.0f);
+  vec2 low;
+  vec2 high;
+  bool has_low = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - r, pixel.y), low);
+  bool has_high = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + r, pixel.y), high);
+  bool has_x = map_axis(centre, has_low, low, has_high, high, float(r), map.ux, map.uxx);
+  has_low = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y - r), low);
+  has_high = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y + r), high);
+  bool has_y = map_axis(centre, has_low, low, has_high, high, float(r), map.uy, map.uyy);
+  if (WARP == WARP_QUADRATIC) {
+    vec2 a;
+    vec2 b;
+    vec2 c;
+    vec2 d;
+    bool corners = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - r, pixel.y - r), a);
+    corners =
+        warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + r, pixel.y - r), b) && corners;
+    corners =
+        warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - r, pixel.y + r), c) && corners;
+    corners =
+        warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + r, pixel.y + r), d) && corners;
+    if (corners) map.uxy = (0.25f / float(r * r)) * ((d - c) - (b - a));
+  }
+  return has_x && has_y;
+}
+
+FN vec2 map_offset(PatchMap map, float x, float y) {
+  vec2 u = map.u0 + x * map.ux + y * map.uy;
+  if (WARP == WARP_QUADRATIC) {
+    u = u + x * x * map.uxx + x * y * map.uxy + y * y * map.uyy;
+  }
+  return u;
+}
+
+// 1 - ZNCC in [0, 2] of sums over n samples; a patch without texture carries no information.
+FN float zncc_cost(float n, float sum_a, float sum_b, float sum_aa, float sum_bb, float sum_ab,
+                   float smallest_variance) {
+  float variance_a = sum_aa - sum_a * sum_a / n;
+  float variance_b = sum_bb - sum_b * sum_b / n;
+  float covariance = sum_ab - sum_a * sum_b / n;
+  if (variance_a < n * smallest_variance) return NO_INFORMATION_COST;
+  float scale = sqrt(max(variance_a, 0.0f) * max(variance_b, 0.0f));
+  if (scale <= 0.0f) return NO_INFORMATION_COST;
+  return 1.0f - clamp(covariance / scale, -1.0f, 1.0f);
+}
+
+// Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
+FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
+  int reference = PASS.reference;
+  ViewPair pair = PARAMETERS.pairs[reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  ivec4 size = PARAMETERS.cameras[reference].size;
+  int model = SOURCE_MODEL >= 0 ? SOURCE_MODEL : camera.size.z;
+  if (side_of_source(pair, m) <= 0.0f) return INVALID_COST;
+
+  // Sums are taken relative to the centre's intensities: single precision then suffices.
+  vec2 centre;
+  float centre_b;
+  if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return INVALID_COST;
+  if (!sample_image(CONTEXT source, camera.size, centre, centre_b)) return INVALID_COST;
+  float centre_a = intensity_at(CONTEXT reference, pixel);
+
+  PatchMap map;
+  if (WARP != WARP_EXACT) {
+    if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, map)) return INVALID_COST;
+  }
+
+  float of_patch = 0.0f;
+  float n = 0.0f;
+  float sum_a = 0.0f;
+  float sum_b = 0.0f;
+  float sum_aa = 0.0f;
+  float sum_bb = 0.0f;
+  float sum_ab = 0.0f;
+  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    for (int dx = -WINDOW_RADIUS; dx <= WINDOW_RADIUS; ++dx) {
+      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+      if (!in_image(size, q)) continue;
+      float a = intensity_at(CONTEXT reference, q);
+      if (a < 0.0f) continue;
+      of_patch += 1.0f;
+      vec2 position;
+      if (WARP == WARP_EXACT) {
+        vec4 ray = ray_at(CONTEXT reference, q);
+        if (!warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position)) continue;
+      } else {
+        position = map_offset(map, float(dx), float(dy));
+      }
+      float b;
+      if (!sample_image(CONTEXT source, camera.size, position, b)) continue;
+      a -= centre_a;
+      b -= centre_b;
+      n += 1.0f;
+      sum_a += a;
+      sum_b += b;
+      sum_aa += a * a;
+      sum_bb += b * b;
+      sum_ab += a * b;
+    }
+  }
+  if (n < PARAMETERS.patch_limits.y * of_patch) return INVALID_COST;
+  return zncc_cost(n, sum_a, sum_b, sum_aa, sum_bb, sum_ab, PARAMETERS.patch_limits.x);
+}
+
+// Mean over the best sources that see the patch; INVALID_COST when none does.
+FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
+  float best[MAX_VIEWS];
+  int count = 0;
+  for (int source = 0; source < VIEW_COUNT; ++source) {
+    if ((PASS.sources & (1u << uint(source))) == 0u) continue;
+    float cost = source_cost(CONTEXT source, pixel, m);
+    if (cost >= INVALID_COST) continue;
+    int place = count;
+    while (place > 0 && best[place - 1] > cost) {
+      best[place] = best[place - 1];
+      --place;
+    }
+    best[place] = cost;
+    ++count;
+  }
+  count = min(count, PARAMETERS.search.z);
+  if (count == 0) return INVALID_COST;
+  float sum = 0.0f;
+  for (int i = 0; i < count; ++i) sum += best[i];
+  return sum / float(count);
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Plane hypotheses: m = n / (n . X) in the camera frame, so that the plane is {X : m . X = 1} and the
+// inverse distance along a unit ray is w = m . ray.
+
+FN vec3 plane_through(vec3 ray, float distance, vec3 normal) {
+  return (1.0f / (distance * dot(normal, ray))) * normal;
+}
+
+FN vec3 rotate(ViewPair pair, vec3 v) {
+  return vec3(pair.row0.x * v.x + pair.row0.y * v.y + pair.row0.z * v.z,
+              pair.row1.x * v.x + pair.row1.y * v.y + pair.row1.z * v.z,
+              pair.row2.x * v.x + pair.row2.y * v.y + pair.row2.z * v.z);
+}
+
+FN vec3 rotate_back(ViewPair pair, vec3 v) {
+  return vec3(pair.row0.x * v.x + pair.row1.x * v.y + pair.row2.x * v.z,
+              pair.row0.y * v.x + pair.row1.y * v.y + pair.row2.y * v.z,
+              pair.row0.z * v.x + pair.row1.z * v.y + pair.row2.z * v.z);
+}
+
+FN vec3 translation(ViewPair pair) { return vec3(pair.row0.w, pair.row1.w, pair.row2.w); }
+
+// Direction, in the source frame, of the point at inverse distance w along a ray: R ray + t w. Divided by
+// w it is the point itself in metres; all cameras are homogeneous, so projection needs no division.
+FN vec3 direction_in_source(ViewPair pair, vec3 ray, float w) {
+  return rotate(pair, ray) + w * translation(pair);
+}
+
+// 1 - m . C with C the source's centre in the reference frame: positive while the source is on the
+// viewer's side of the plane.
+FN float side_of_source(ViewPair pair, vec3 m) {
+  return 1.0f + dot(rotate(pair, m), translation(pair));
+}
+
+// The same plane in the source frame; side_of_source() must be positive.
+FN vec3 plane_in_source(ViewPair pair, vec3 m) {
+  return (1.0f / side_of_source(pair, m)) * rotate(pair, m);
+}

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// PatchMatch over plane hypotheses: random initialisation, propagation and random refinement of one pixel.
+
+#define PI 3.14159265f
+#define UNIFORM_SAMPLING 0
+
+#define NEIGHBOUR_LEFT 1
+#define NEIGHBOUR_RIGHT 2
+#define NEIGHBOUR_UP 4
+#define NEIGHBOUR_DOWN 8
+
+FN vec3 normal_from_angles(float theta, float phi) {
+  return vec3(sin(phi) * cos(theta), sin(phi) * sin(theta), cos(phi));
+}
+
+// A distance drawn from the range as the options ask, u in [0, 1).
+FN float draw_distance(CONTEXT_ARGUMENT float u) {
+  vec4 range = PARAMETERS.range;
+  if (PARAMETERS.search.x == UNIFORM_SAMPLING) return range.x + u * (range.y - range.x);
+  return 1.0f / (range.z + u * (range.w - range.z));
+}
+
+// A hypothesis may be held only if its distance is in range and it is not seen too obliquely.
+FN bool admissible(CONTEXT_ARGUMENT vec3 ray, vec3 m) {
+  float w = dot(m, ray);
+  // The tolerance lets distances at the very ends of the range survive rounding.
+  return w >= PARAMETERS.range.z * 0.99999f && w <= PARAMETERS.range.w * 1.00001f &&
+         w >= PARAMETERS.patch_limits.z * length(m);
+}
+
+// Draw `slot` of this iteration: a plane at a random distance with a random normal.
+FN vec3 random_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, int slot) {
+  vec3 m = vec3(0.0f, 0.0f, 0.0f);
+  for (int attempt = 0; attempt < 4; ++attempt) {
+    vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, slot + attempt);
+    float distance = draw_distance(CONTEXT u.x);
+    m = plane_through(ray, distance, normal_from_angles(2.0f * PI * u.y, PI * u.z));
+    if (admissible(CONTEXT ray, m)) return m;
+    m = (1.0f / distance) * ray;
+  }
+  return m;
+}
+
+// A plane near m: distance and both angles of the normal moved by up to `scale` times their first ranges.
+FN vec3 perturbed_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float scale, int slot) {
+  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, slot);
+  vec4 range = PARAMETERS.range;
+  float w = dot(m, ray);
+  float distance = 1.0f / w;
+  if (PARAMETERS.search.x == UNIFORM_SAMPLING) {
+    distance += scale * 0.25f * (range.y - range.x) * (2.0f * u.x - 1.0f);
+    distance = clamp(distance, range.x, range.y);
+  } else {
+    w += scale * 0.25f * (range.w - range.z) * (2.0f * u.x - 1.0f);
+    distance = 1.0f / clamp(w, range.z, range.w);
+  }
+  float theta = atan(-m.y, -m.x) + scale * PI * (2.0f * u.y - 1.0f);
+  float phi = atan(sqrt(m.x * m.x + m.y * m.y), -m.z) + scale * 0.5f * PI * (2.0f * u.z - 1.0f);
+  return plane_through(ray, distance, normal_from_angles(theta, phi));
+}
+
+// The better of the held hypothesis (m, cost) and a candidate.
+FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m) {
+  bool same = m.x == held.x && m.y == held.y && m.z == held.z;
+  if (same || !admissible(CONTEXT ray, m)) return held;
+  float cost = patch_cost(CONTEXT pixel, m);
+  if (cost < held.w) return vec4(m, cost);
+  return held;
+}
+
+// Candidate i of a pixel: the planes of the four neighbours, then random perturbations of the held plane with
+// the range halved each time. Zero, which is never admissible, where there is none.
+FN vec3 candidate_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, int i) {
+  if (i >= 4) {
+    float scale = 1.0f / float(1 << (i - 4));
+    return perturbed_plane(CONTEXT pixel, ray, vec3(held.x, held.y, held.z), scale, i);
+  }
+  int side = 1 << i;
+  int dx = side == NEIGHBOUR_LEFT ? -1 : (side == NEIGHBOUR_RIGHT ? 1 : 0);
+  int dy = side == NEIGHBOUR_UP ? -1 : (side == NEIGHBOUR_DOWN ? 1 : 0);
+  ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+  if ((PASS.neighbours & side) == 0) return vec3(0.0f, 0.0f, 0.0f);
+  if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) return vec3(0.0f, 0.0f, 0.0f);
+  vec4 neighbour = hypothesis_at(CONTEXT PASS.reference, q);
+  return vec3(neighbour.x, neighbour.y, neighbour.z);
+}
+
+FN void store_random_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  vec3 m = random_plane(CONTEXT pixel, ray, 0);
+  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+}
+
+FN void store_no_plane(CONTEXT_ARGUMENT ivec2 pixel) {
+  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(0.0f, 0.0f, 0.0f, INVALID_COST));
+}
+
+FN void initialise_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (ray.w == 0.0f) {
+    store_no_plane(CONTEXT pixel);
+  } else {
+    store_random_plane(CONTEXT pixel, vec3(ray.x, ray.y, ray.z));
+  }
+}
+
+FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (usable_ray.w == 0.0f) return;
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  // One loop for all candidates: the cost function is then compiled once.
+  int candidates = 4 + PARAMETERS.search.y;
+  for (int i = 0; i < candidates; ++i) {
+    held = better_of(CONTEXT pixel, ray, held, candidate_plane(CONTEXT pixel, ray, held, i));
+  }
+  store_hypothesis(CONTEXT PASS.reference, pixel, held);
+}

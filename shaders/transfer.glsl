@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// Starts a view from another view's planes: every plane is warped forward, the nearest one wins its pixel.
+// Integer atomics on inverse distances and pixel indices keep the outcome independent of the order.
+
+// Where pixel p of view PASS.other lands in the reference view: top left of its four pixels and its inverse
+// distance there. False where it has no plane or lands outside the model's domain.
+FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inverse_distance) {
+  corner = ivec2(0, 0);
+  inverse_distance = 0.0f;
+  vec4 ray = ray_at(CONTEXT PASS.other, p);
+  vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
+  if (ray.w == 0.0f || plane.w >= INVALID_COST) return false;
+  ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
+  CameraParameters camera = PARAMETERS.cameras[PASS.reference];
+  vec3 m = vec3(plane.x, plane.y, plane.z);
+  vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
+  vec2 position;
+  if (side_of_source(pair, m) <= 0.0f) return false;
+  if (!warp_ray(pair, camera, camera.size.z, m, unit_ray, position)) return false;
+  if (!(position.x > -1.0f && position.y > -1.0f && position.x < float(camera.size.x) &&
+        position.y < float(camera.size.y))) {
+    return false;
+  }
+  float w = dot(m, unit_ray);
+  inverse_distance = w / length(direction_in_source(pair, unit_ray, w));
+  corner = ivec2(int(floor(position.x)), int(floor(position.y)));
+  return true;
+}
+
+FN void transfer_clear_pixel(CONTEXT_ARGUMENT ivec2 pixel) { transfer_reset(CONTEXT pixel); }
+
+FN void transfer_nearest_pixel(CONTEXT_ARGUMENT ivec2 p) {
+  ivec2 corner;
+  float inverse_distance;
+  if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
+  for (int i = 0; i < 4; ++i) {
+    ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
+    if (in_image(PARAMETERS.cameras[PASS.reference].size, q)) {
+      transfer_nearest_raise(CONTEXT q, float_as_uint(inverse_distance));
+    }
+  }
+}
+
+FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
+  ivec2 corner;
+  float inverse_distance;
+  if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
+  uint index = uint(p.y * PARAMETERS.cameras[PASS.other].size.x + p.x);
+  for (int i = 0; i < 4; ++i) {
+    ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
+    if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
+    // Tolerant, because another kernel may have rounded the same inverse distance differently.
+    float nearest = uint_as_float(transfer_nearest_at(CONTEXT q));
+    if (inverse_distance >= nearest * 0.9999f) transfer_winner_lower(CONTEXT q, index);
+  }
+}
+
+FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (usable_ray.w == 0.0f) {
+    store_no_plane(CONTEXT pixel);
+    return;
+  }
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 m = random_plane(CONTEXT pixel, ray, 0);
+  uint index = transfer_winner_at(CONTEXT pixel);
+  if (index != 0xffffffffu) {
+    int width = PARAMETERS.cameras[PASS.other].size.x;
+    ivec2 p = ivec2(int(index) % width, int(index) / width);
+    vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
+    ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
+    vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
+    if (admissible(CONTEXT ray, moved)) m = moved;
+  }
+  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+}
