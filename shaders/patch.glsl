@@ -63,9 +63,7 @@ FN bool map_axis(vec2 centre, bool has_low, vec2 low, bool has_high, vec2 high, 
   slope = vec2(0.0f, 0.0f);
   if (has_low && has_high) {
     slope = (0.5f / r) * (high - low);
-    if (WARP == WARP_QUADRATIC) {
-      curvature = (0.5f / (r * r)) * ((high - centre) - (centre - low));
-    }
+    curvature = (0.5f / (r * r)) * ((high - centre) - (centre - low));
     return true;
   }
   if (has_high) slope = (1.0f / r) * (high - centre);
@@ -105,9 +103,9 @@ FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int m
   return has_x && has_y;
 }
 
-FN vec2 map_offset(PatchMap map, float x, float y) {
+FN vec2 map_offset(PatchMap map, int warp, float x, float y) {
   vec2 u = map.u0 + x * map.ux + y * map.uy;
-  if (WARP == WARP_QUADRATIC) {
+  if (warp == WARP_QUADRATIC) {
     u = u + x * x * map.uxx + x * y * map.uxy + y * y * map.uyy;
   }
   return u;
@@ -165,7 +163,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
         vec4 ray = ray_at(CONTEXT reference, q);
         if (!warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position)) continue;
       } else {
-        position = map_offset(map, float(dx), float(dy));
+        position = map_offset(map, WARP, float(dx), float(dy));
       }
       float b;
       if (!sample_image(CONTEXT source, camera.size, position, b)) continue;

@@ -34,7 +34,7 @@ struct DeviceRequest {
 class Device {
  public:
   static Device open(const DeviceRequest& request);
-  static Device open(const std::string& device) { return open(DeviceRequest{.device = device}); }
+  static Device open(const std::string& device);
   /// All devices of this machine, best first, the CPU last. Never throws for a missing driver.
   static std::vector<DeviceInfo> list();
 

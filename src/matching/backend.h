@@ -12,6 +12,29 @@
 
 namespace widestereo {
 
+/// Sums of device time per kernel, in order of first use.
+class KernelTimes {
+ public:
+  void clear() { times_.clear(); }
+  void add(Kernel kernel, int dispatches, double milliseconds);
+  const std::vector<KernelTime>& list() const { return times_; }
+
+ private:
+  std::vector<KernelTime> times_;
+};
+
+/// Turns finished patch samples into calls of a progress function.
+class ScheduleProgress {
+ public:
+  ScheduleProgress(const Schedule& schedule, const Matcher::Progress& progress);
+  void advance(long long samples);
+
+ private:
+  const Matcher::Progress& progress_;
+  long long total_ = 0;
+  long long done_ = 0;
+};
+
 /// Memory and kernels for matches of fixed sizes on one device. All maps have their view's size.
 class Backend {
  public:

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// The shared kernel source compiled for the CPU: the accessors it reads and writes through, then the
+// algorithm itself.
+#pragma once
+
+#include <atomic>
+#include <opencv2/core/mat.hpp>
+
+#include "kernel/host.h"
+#include "schedule/schedule.h"
+
+namespace widestereo::kernel::cpu {
+
+/// Memory of one view: row-major, width pixels a row.
+struct ViewMemory {
+  cv::Mat_<cv::Vec4f> rays;
+  cv::Mat_<float> intensities;
+  cv::Mat_<cv::Vec4f> hypotheses;
+  cv::Mat_<cv::Vec4f> checks;
+};
+
+/// What a kernel sees besides its pixel.
+struct Context {
+  const MatchParameters& parameters;
+  const PassParameters& pass;
+  const KernelConstants& constants;
+  ViewMemory* views;
+  cv::Mat_<int>& transfer_nearest;  ///< of the reference view; bit patterns of unsigned integers
+  cv::Mat_<int>& transfer_winner;
+};
+
+#define WINDOW_RADIUS context.constants.window_radius
+#define WARP context.constants.warp
+#define SOURCE_MODEL context.constants.source_model
+#define VIEW_COUNT context.constants.view_count
+
+inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
+
+inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return to_vec4(context.views[view].rays(p.y, p.x));
+}
+inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return context.views[view].intensities(p.y, p.x);
+}
+inline vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+  const float* top = &context.views[view].intensities(p.y, p.x);
+  const float* bottom = &context.views[view].intensities(p.y + 1, p.x);
+  return {top[0], top[1], bottom[0], bottom[1]};
+}
+inline vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return to_vec4(context.views[view].hypotheses(p.y, p.x));
+}
+inline void store_hypothesis(CONTEXT_ARGUMENT int view, ivec2 p, vec4 h) {
+  context.views[view].hypotheses(p.y, p.x) = {h.x, h.y, h.z, h.w};
+}
+inline void store_check(CONTEXT_ARGUMENT int view, ivec2 p, vec4 c) {
+  context.views[view].checks(p.y, p.x) = {c.x, c.y, c.z, c.w};
+}
+
+inline std::atomic_ref<uint> atomic_at(cv::Mat_<int>& buffer, ivec2 p) {
+  return std::atomic_ref<uint>(reinterpret_cast<uint&>(buffer(p.y, p.x)));
+}
+inline void transfer_reset(CONTEXT_ARGUMENT ivec2 p) {
+  atomic_at(context.transfer_nearest, p) = 0u;
+  atomic_at(context.transfer_winner, p) = 0xffffffffu;
+}
+inline uint transfer_nearest_at(CONTEXT_ARGUMENT ivec2 p) {
+  return atomic_at(context.transfer_nearest, p);
+}
+inline uint transfer_winner_at(CONTEXT_ARGUMENT ivec2 p) {
+  return atomic_at(context.transfer_winner, p);
+}
+inline void transfer_nearest_raise(CONTEXT_ARGUMENT ivec2 p, uint bits) {
+  auto cell = atomic_at(context.transfer_nearest, p);
+  uint seen = cell;
+  while (seen < bits && !cell.compare_exchange_weak(seen, bits)) {
+  }
+}
+inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
+  auto cell = atomic_at(context.transfer_winner, p);
+  uint seen = cell;
+  while (seen > index && !cell.compare_exchange_weak(seen, index)) {
+  }
+}
+
+// clang-format off: the order matters
+#include "random.glsl"
+#include "plane.glsl"
+#include "patch.glsl"
+#include "search.glsl"
+#include "transfer.glsl"
+#include "check.glsl"
+// clang-format on
+
+}  // namespace widestereo::kernel::cpu

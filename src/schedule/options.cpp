@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/options.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+NLOHMANN_JSON_SERIALIZE_ENUM(PatchWarp, {{PatchWarp::exact, "exact"},
+                                         {PatchWarp::affine, "affine"},
+                                         {PatchWarp::quadratic, "quadratic"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(DistanceSampling, {{DistanceSampling::uniform, "uniform"},
+                                                {DistanceSampling::inverse, "inverse"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(Propagation, {{Propagation::checkerboard, "checkerboard"},
+                                           {Propagation::raster, "raster"}})
+
+void require_between(double value, double low, double high, const std::string& name) {
+  if (value >= low && value <= high) return;  // false for NaN
+  const auto text = [](double number) { return nlohmann::json(number).dump(); };
+  throw Error("The option " + name + " is " + text(value) + "; it must lie between " + text(low) +
+              " and " + text(high) + ".");
+}
+
+}  // namespace
+
+Options Options::preset_named(const std::string& name) {
+  Options options;
+  if (name == "paper") return options;
+  std::string known;
+  for (const std::string& preset : preset_names()) known += " \"" + preset + "\"";
+  throw Error("There is no preset \"" + name + "\"; choose one of" + known + ".");
+}
+
+std::vector<std::string> Options::preset_names() { return {"paper"}; }
+
+void validate(const Options& o) {
+  if (!std::isfinite(o.min_distance) || !std::isfinite(o.max_distance) || o.min_distance <= 0 ||
+      o.max_distance <= o.min_distance) {
+    throw Error("The distance range " + nlohmann::json(o.min_distance).dump() + " to " +
+                nlohmann::json(o.max_distance).dump() +
+                " m is not usable: give a positive nearest and a larger, finite farthest distance.");
+  }
+  require_between(o.window_radius, 1, 15, "window radius");
+  require_between(o.first_iterations, 1, 100000, "first iterations");
+  require_between(o.second_iterations, 0, 100000, "second iterations");
+  require_between(o.refinements, 0, 16, "refinements");
+  require_between(o.best_sources, 1, 8, "best sources");
+  require_between(o.min_texture, 0, 255, "min texture");
+  require_between(o.min_visible, 0, 1, "min visible");
+  require_between(o.consistency_relative, 0, 1000, "consistency (relative)");
+  require_between(o.consistency_pixels, 0, 1000, "consistency (pixels)");
+  require_between(o.max_cost, 0, 2, "max cost");
+  require_between(o.min_parallax, 0, 10000, "min parallax");
+  require_between(o.max_tilt, 0, 90, "max tilt");
+}
+
+std::string to_json(const Options& o) {
+  const nlohmann::ordered_json json = {{"preset", o.preset},
+                                       {"min_distance", o.min_distance},
+                                       {"max_distance", o.max_distance},
+                                       {"seed", o.seed},
+                                       {"window_radius", o.window_radius},
+                                       {"warp", o.warp},
+                                       {"sampling", o.sampling},
+                                       {"propagation", o.propagation},
+                                       {"first_iterations", o.first_iterations},
+                                       {"second_iterations", o.second_iterations},
+                                       {"refinements", o.refinements},
+                                       {"best_sources", o.best_sources},
+                                       {"min_texture", o.min_texture},
+                                       {"min_visible", o.min_visible},
+                                       {"consistency_relative", o.consistency_relative},
+                                       {"consistency_pixels", o.consistency_pixels},
+                                       {"max_cost", o.max_cost},
+                                       {"min_parallax", o.min_parallax},
+                                       {"max_tilt", o.max_tilt}};
+  return json.dump(2);
+}
+
+}  // namespace widestereo
