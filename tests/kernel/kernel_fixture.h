@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+// Two views with random smooth images, ready for calling the kernels of the CPU back end one by one.
+#pragma once
+
+#include <opencv2/imgproc.hpp>
+
+#include "cpu/kernels.h"
+#include "schedule/schedule.h"
+#include "widestereo/rig.h"
+
+namespace widestereo::test {
+
+/// TUM-VI-like double-sphere camera of `size` x `size` pixels that sees `max_theta` radians off axis.
+inline Camera fisheye_camera(int size, double max_theta = 1.7) {
+  Camera camera;
+  camera.model = CameraModel::double_sphere;
+  camera.width = camera.height = size;
+  camera.fx = camera.fy = 0.309 * size;
+  camera.cx = 0.498 * size;
+  camera.cy = 0.502 * size;
+  camera.xi = -0.17;
+  camera.alpha = 0.59;
+  camera.max_theta = max_theta;
+  return camera;
+}
+
+inline Rig fisheye_rig(int size, double max_theta = 1.7) {
+  Rig rig;
+  rig.views.resize(2);
+  for (int i = 0; i < 2; ++i) {
+    rig.views[i].name = "cam" + std::to_string(i);
+    rig.views[i].camera = fisheye_camera(size, max_theta);
+  }
+  rig.views[1].world_from_camera =
+      Eigen::Translation3d(0.1, 0.004, -0.01) *
+      Eigen::AngleAxisd(0.05, Eigen::Vector3d(1, 0.3, -0.2).normalized());
+  return rig;
+}
+
+/// Smooth noise in [0.1, 0.9] with features of a few pixels.
+inline cv::Mat smooth_noise(cv::Size size, int seed) {
+  cv::RNG random(seed);
+  cv::Mat noise(size, CV_32FC1);
+  random.fill(noise, cv::RNG::UNIFORM, 0.0, 1.0);
+  cv::GaussianBlur(noise, noise, {}, 1.5);
+  cv::normalize(noise, noise, 0.1, 0.9, cv::NORM_MINMAX);
+  return noise;
+}
+
+class KernelFixture {
+ public:
+  KernelFixture(Rig rig, const Options& options)
+      : rig_(std::move(rig)), schedule_(make_schedule(rig_, options)), views_(rig_.views.size()) {
+    cv::Size largest;
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const View& view = rig_.views[i];
+      const cv::Size size(view.camera.width, view.camera.height);
+      views_[i].rays = ray_image(view.camera, view.mask);
+      views_[i].intensities = smooth_noise(size, static_cast<int>(i) + 1);
+      cv::Mat usable;
+      cv::extractChannel(views_[i].rays, usable, 3);
+      views_[i].intensities.setTo(-1, usable == 0);
+      views_[i].hypotheses = cv::Mat::zeros(size, CV_32FC4);
+      views_[i].checks = cv::Mat::zeros(size, CV_32FC4);
+      largest = {std::max(largest.width, size.width), std::max(largest.height, size.height)};
+    }
+    nearest_.create(largest);
+    winner_.create(largest);
+    pass_ = schedule_.dispatches.front().pass;
+  }
+
+  kernel::cpu::Context context() {
+    return {schedule_.parameters, pass_, schedule_.constants, views_.data(), nearest_, winner_};
+  }
+  kernel::PassParameters& pass() { return pass_; }
+  Schedule& schedule() { return schedule_; }
+  const Rig& rig() const { return rig_; }
+  kernel::cpu::ViewMemory& view(int i) { return views_[i]; }
+
+  /// Makes `view` the reference and every other view a source.
+  void set_reference(int view) {
+    pass_.reference = view;
+    pass_.sources = ((1u << views_.size()) - 1) & ~(1u << view);
+  }
+
+ private:
+  Rig rig_;
+  Schedule schedule_;
+  std::vector<kernel::cpu::ViewMemory> views_;
+  cv::Mat_<int> nearest_, winner_;
+  kernel::PassParameters pass_{};
+};
+
+}  // namespace widestereo::test

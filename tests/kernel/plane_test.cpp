@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// Plane algebra, random numbers and transfer of the shared kernel source against independent arithmetic.
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+#include "kernel_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using kernel::ivec2;
+using kernel::vec3;
+
+Eigen::Vector3d to_eigen(const vec3& v) { return Eigen::Vector3f(v.x, v.y, v.z).cast<double>(); }
+vec3 to_kernel(const Eigen::Vector3d& v) {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+TEST(Plane, HoldsTheGivenPointAndNormal) {
+  const Eigen::Vector3d ray = Eigen::Vector3d(0.9, -0.2, -0.3).normalized();  // beyond 90 degrees
+  const Eigen::Vector3d normal = Eigen::Vector3d(-0.7, 0.4, 0.5).normalized();
+  const Eigen::Vector3d m = to_eigen(kernel::cpu::plane_through(to_kernel(ray), 2.5f, to_kernel(normal)));
+  EXPECT_NEAR(m.dot(2.5 * ray), 1, 1e-6);
+  EXPECT_NEAR(m.normalized().cross(normal).norm(), 0, 1e-6);
+}
+
+TEST(Plane, MovesToTheSourceFrame) {
+  const KernelFixture fixture(fisheye_rig(32), Options{});
+  KernelFixture& f = const_cast<KernelFixture&>(fixture);
+  const Eigen::Isometry3d motion = source_from_reference(f.rig().views[1], f.rig().views[0]);
+  const kernel::ViewPair pair = f.schedule().parameters.pairs[1];
+  const Eigen::Vector3d m(0.3, -0.2, 0.5);
+  const Eigen::Vector3d moved = to_eigen(kernel::cpu::plane_in_source(pair, to_kernel(m)));
+  for (const Eigen::Vector3d& direction :
+       {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 0.5, 0.4), Eigen::Vector3d(-0.1, -1, 0.2)}) {
+    const Eigen::Vector3d point = direction / m.dot(direction);
+    EXPECT_NEAR(moved.dot(motion * point), 1, 1e-5);
+  }
+  const Eigen::Vector3d centre = motion.inverse().translation();
+  EXPECT_NEAR(static_cast<double>(kernel::cpu::side_of_source(pair, to_kernel(m))), 1 - m.dot(centre),
+              1e-6);
+}
+
+TEST(Random, IsUniformAndIndependentOfOrder) {
+  constexpr int n = 200;
+  double mean = 0;
+  double square = 0;
+  std::set<float> distinct;
+  for (int y = 0; y < n; ++y) {
+    for (int x = 0; x < n; ++x) {
+      const kernel::vec4 u = kernel::cpu::random4(1, 0, ivec2(x, y), 3, 5);
+      for (const float value : {u.x, u.y, u.z, u.w}) {
+        ASSERT_GE(value, 0);
+        ASSERT_LT(value, 1);
+        mean += static_cast<double>(value) / (4.0 * n * n);
+        square += static_cast<double>(value) * static_cast<double>(value) / (4.0 * n * n);
+        distinct.insert(value);
+      }
+    }
+  }
+  EXPECT_NEAR(mean, 0.5, 0.005);
+  EXPECT_NEAR(square, 1.0 / 3, 0.005);
+  EXPECT_GT(distinct.size(), 4 * n * n * 0.98);
+  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x, kernel::cpu::random4(2, 0, ivec2(4, 5), 3, 5).x);
+  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x, kernel::cpu::random4(1, 1, ivec2(4, 5), 3, 5).x);
+  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x, kernel::cpu::random4(1, 0, ivec2(4, 5), 4, 5).x);
+}
+
+TEST(Search, DrawsStayAdmissible) {
+  for (const DistanceSampling sampling : {DistanceSampling::uniform, DistanceSampling::inverse}) {
+    Options options;
+    options.min_distance = 0.5;
+    options.max_distance = 20;
+    options.sampling = sampling;
+    KernelFixture fixture(fisheye_rig(64), options);
+    double mean_distance = 0;
+    double mean_inverse = 0;
+    int n = 0;
+    for (int y = 0; y < 64; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        const cv::Vec4f r = fixture.view(0).rays(y, x);
+        if (r[3] == 0) continue;
+        const vec3 ray(r[0], r[1], r[2]);
+        const vec3 drawn = kernel::cpu::random_plane(fixture.context(), ivec2(x, y), ray, 0);
+        ASSERT_TRUE(kernel::cpu::admissible(fixture.context(), ray, drawn));
+        const double w = static_cast<double>(dot(drawn, ray));
+        mean_distance += 1 / w;
+        mean_inverse += w;
+        ++n;
+        const vec3 near = kernel::cpu::perturbed_plane(fixture.context(), ivec2(x, y), ray, drawn, 1.0f, 4);
+        const double distance = 1 / static_cast<double>(dot(near, ray));
+        ASSERT_GT(distance, 0.4999);
+        ASSERT_LT(distance, 20.002);
+      }
+    }
+    if (sampling == DistanceSampling::uniform) {
+      EXPECT_NEAR(mean_distance / n, 10.25, 0.4);
+    } else {
+      EXPECT_NEAR(mean_inverse / n, (2 + 0.05) / 2, 0.04);
+    }
+  }
+}
+
+TEST(Transfer, CarriesAPlaneIntoTheOtherView) {
+  Options options;
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  KernelFixture fixture(fisheye_rig(96), options);
+  // One slanted plane in front of the rig, held by all pixels of view 0 that see it.
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const cv::Vec4f ray = fixture.view(0).rays(y, x);
+      const double w = m.dot(Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>());
+      const vec3 mk = to_kernel(m);
+      fixture.view(0).hypotheses(y, x) = w > 0.02 ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
+    }
+  }
+  fixture.set_reference(1);
+  fixture.pass().other = 0;
+  const auto context = fixture.context();
+  const auto run = [&](auto function) {
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) function(context, ivec2(x, y));
+    }
+  };
+  run(kernel::cpu::transfer_clear_pixel);
+  run(kernel::cpu::transfer_nearest_pixel);
+  run(kernel::cpu::transfer_winner_pixel);
+  run(kernel::cpu::transfer_gather_pixel);
+  const Eigen::Vector3d expected =
+      to_eigen(kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], to_kernel(m)));
+  int carried = 0;
+  int central = 0;
+  for (int y = 20; y < 76; ++y) {
+    for (int x = 20; x < 76; ++x) {
+      const cv::Vec4f h = fixture.view(1).hypotheses(y, x);
+      ++central;
+      carried += (Eigen::Vector3f(h[0], h[1], h[2]).cast<double>() - expected).norm() < 1e-5;
+    }
+  }
+  EXPECT_GT(carried, 0.99 * central);
+}
+
+TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
+  Options options;
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  KernelFixture fixture(fisheye_rig(96), options);
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  const Eigen::Vector3d moved =
+      to_eigen(kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], to_kernel(m)));
+  const auto fill = [&](int view, const Eigen::Vector3d& plane) {
+    const vec3 mk = to_kernel(plane);
+    fixture.view(view).hypotheses.setTo(cv::Scalar(mk.x, mk.y, mk.z, 0.1));
+  };
+  fill(0, m);
+  fill(1, moved);
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  cv::Vec4f check = fixture.view(0).checks(48, 48);
+  EXPECT_LT(check[0], 1e-4);
+  EXPECT_LT(check[1], 1e-2);
+  EXPECT_GT(check[2], 0.85f);
+  EXPECT_EQ(check[3], 0);
+
+  fill(1, 1.05 * moved);  // 5 % nearer
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  check = fixture.view(0).checks(48, 48);
+  EXPECT_NEAR(check[0], 0.05, 0.003);
+  EXPECT_EQ(static_cast<int>(check[3]), REASON_INCONSISTENT);
+  EXPECT_EQ(check[2], 0);
+
+  fixture.view(0).hypotheses.setTo(cv::Scalar(0, 0, 0, 2));
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  EXPECT_EQ(static_cast<int>(fixture.view(0).checks(48, 48)[3]), REASON_NO_OVERLAP);
+  kernel::cpu::check_pixel(fixture.context(), ivec2(0, 0));
+  EXPECT_EQ(static_cast<int>(fixture.view(0).checks(0, 0)[3]), REASON_NO_RAY);
+}
+
+}  // namespace
+}  // namespace widestereo::test

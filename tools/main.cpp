@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include <CLI/CLI.hpp>
+#include <iostream>
+
+#include "commands.h"
+#include "widestereo/error.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "widestereo: dense stereo directly on ultra-wide-angle (fisheye) images, without "
+      "rectification"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", WIDESTEREO_VERSION);
+  add_demo_command(app);
+  add_depth_command(app);
+  add_evaluate_command(app);
+  add_calibration_command(app);
+  add_devices_command(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const widestereo::Error& error) {
+    std::cerr << "widestereo: " << error.what() << "\n";
+    return 1;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "widestereo: Not enough memory; use smaller images.\n";
+    return 1;
+  } catch (const std::exception& error) {
+    std::cerr << "widestereo: Internal error: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

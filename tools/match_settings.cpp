@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+#include "match_settings.h"
+
+#include <map>
+
+using widestereo::DistanceSampling;
+using widestereo::Options;
+using widestereo::PatchWarp;
+using widestereo::Propagation;
+
+namespace {
+
+template <class T>
+void take(T& target, const std::optional<T>& given) {
+  if (given) target = *given;
+}
+
+}  // namespace
+
+void MatchSettings::add_to(CLI::App& command) {
+  const std::string devices = "Device";
+  command.add_option("--device", device.device,
+                     "auto, cpu, vulkan, vulkan:INDEX, vulkan:NAME PART or vulkan:UUID")
+      ->capture_default_str()
+      ->group(devices);
+  command.add_flag("--validation", device.validation, "Vulkan: run with validation layers")
+      ->group(devices);
+  command
+      .add_option("--pipeline-cache", device.pipeline_cache,
+                  "Vulkan: file that keeps compiled pipelines between runs")
+      ->group(devices);
+  command
+      .add_option("--max-samples-per-dispatch", device.max_samples_per_dispatch,
+                  "Vulkan: longest dispatch in patch samples, 0 = by device type")
+      ->group(devices);
+
+  const std::string matching = "Matching";
+  const auto add = [&](const std::string& name, auto& target, const std::string& help) {
+    return command.add_option(name, target, help)->group(matching);
+  };
+  command.add_option("--preset", preset, "Parameters to start from")
+      ->check(CLI::IsMember(Options::preset_names()))
+      ->capture_default_str()
+      ->group(matching);
+  add("--min-distance", min_distance, "Nearest distance along the ray, metres");
+  add("--max-distance", max_distance, "Farthest distance along the ray, metres");
+  add("--seed", seed, "Seed of the random numbers");
+  add("--window-radius", window_radius, "Patch of (2 r + 1)^2 pixels");
+  add("--warp", warp, "How a patch is mapped: exact, affine or quadratic")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, PatchWarp>{{"exact", PatchWarp::exact},
+                                           {"affine", PatchWarp::affine},
+                                           {"quadratic", PatchWarp::quadratic}}));
+  add("--sampling", sampling, "How distances are drawn: uniform or inverse")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, DistanceSampling>{
+          {"uniform", DistanceSampling::uniform}, {"inverse", DistanceSampling::inverse}}));
+  add("--propagation", propagation, "Order of pixels: checkerboard, or raster (CPU only)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Propagation>{
+          {"checkerboard", Propagation::checkerboard}, {"raster", Propagation::raster}}));
+  add("--iterations", first_iterations, "Iterations of the first view");
+  add("--second-iterations", second_iterations, "Iterations of every further view");
+  add("--refinements", refinements, "Random perturbations per pixel and iteration");
+  add("--best-sources", best_sources, "Cost = mean over this many best source views");
+  add("--min-texture", min_texture, "Smallest standard deviation of a patch, grey levels of 255");
+  add("--min-visible", min_visible, "Share of a patch that must be seen in the source");
+
+  const std::string checks = "Checks";
+  const auto add_check = [&](const std::string& name, auto& target, const std::string& help) {
+    command.add_option(name, target, help)->group(checks);
+  };
+  add_check("--consistency-relative", consistency_relative,
+            "Left-right check: largest relative difference of distance");
+  add_check("--consistency-pixels", consistency_pixels,
+            "Left-right check: largest displacement, pixels");
+  add_check("--max-cost", max_cost, "Largest matching cost 1 - ZNCC");
+  add_check("--min-parallax", min_parallax, "Smallest parallax over the distance range, pixels");
+  add_check("--max-tilt", max_tilt, "Largest angle between normal and viewing ray, degrees");
+}
+
+Options MatchSettings::options() const {
+  Options options = Options::preset_named(preset);
+  take(options.min_distance, min_distance);
+  take(options.max_distance, max_distance);
+  take(options.seed, seed);
+  take(options.window_radius, window_radius);
+  take(options.warp, warp);
+  take(options.sampling, sampling);
+  take(options.propagation, propagation);
+  take(options.first_iterations, first_iterations);
+  take(options.second_iterations, second_iterations);
+  take(options.refinements, refinements);
+  take(options.best_sources, best_sources);
+  take(options.min_texture, min_texture);
+  take(options.min_visible, min_visible);
+  take(options.max_cost, max_cost);
+  take(options.min_parallax, min_parallax);
+  take(options.max_tilt, max_tilt);
+  take(options.consistency_relative, consistency_relative);
+  take(options.consistency_pixels, consistency_pixels);
+  validate(options);
+  return options;
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// The command line's options of matching, shared by all commands that match.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "widestereo/device.h"
+#include "widestereo/options.h"
+
+/// Values given on the command line; the rest comes from the preset.
+struct MatchSettings {
+  std::string preset = "paper";
+  widestereo::DeviceRequest device;
+  std::optional<double> min_distance, max_distance;
+  std::optional<int> window_radius, first_iterations, second_iterations, refinements, best_sources;
+  std::optional<std::uint32_t> seed;
+  std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt;
+  std::optional<double> consistency_relative, consistency_pixels;
+  std::optional<widestereo::PatchWarp> warp;
+  std::optional<widestereo::DistanceSampling> sampling;
+  std::optional<widestereo::Propagation> propagation;
+
+  /// Adds --preset, --device and one option for each parameter.
+  void add_to(CLI::App& command);
+  /// The preset with the given values in place.
+  widestereo::Options options() const;
+};
