@@ -31,6 +31,9 @@ struct ViewResult {
   cv::Mat distance;    ///< CV_32FC1, metres along the unit ray, 0 where there is no plane; not filtered
   cv::Mat normals;     ///< CV_32FC3, unit, camera frame, facing the camera; 0 where there is no plane
   cv::Mat cost;        ///< CV_32FC1, 1 - ZNCC in [0, 2]
+  /// CV_32FC2: relative difference of distance (share) and displacement (pixels) between the pixel's point
+  /// and where the best agreeing source view's own plane puts it; 1000 where that cannot be measured.
+  cv::Mat differences;
   cv::Mat confidence;  ///< CV_32FC1 in [0, 1]
   cv::Mat reasons;     ///< CV_8UC1, Reason bits; 0 = accepted
 };

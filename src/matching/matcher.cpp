@@ -52,6 +52,7 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
 void unpack_checks(const cv::Mat& checks, ViewResult& result) {
   std::vector<cv::Mat> channels;
   cv::split(checks, channels);
+  cv::merge(std::vector<cv::Mat>{channels[0], channels[1]}, result.differences);
   result.confidence = channels[2];
   channels[3].convertTo(result.reasons, CV_8U);
 }

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// Devices for tests that run on every back end, with the Vulkan validation layers on.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "widestereo/device.h"
+#include "widestereo/error.h"
+
+namespace widestereo::test {
+
+/// Opens a device, or skips the test with the reason; where WIDESTEREO_REQUIRE_VULKAN is set, a missing
+/// Vulkan device or validation layer fails it instead.
+#define OPEN_DEVICE_OR_SKIP(device, name)                                                    \
+  std::optional<::widestereo::Device> device;                                                \
+  try {                                                                                      \
+    device.emplace(::widestereo::test::open_validated(name));                                \
+  } catch (const ::widestereo::Error& error) {                                               \
+    if (std::getenv("WIDESTEREO_REQUIRE_VULKAN") != nullptr) FAIL() << error.what();          \
+    GTEST_SKIP() << error.what();                                                            \
+  }
+
+inline Device open_validated(const std::string& name, long max_samples_per_dispatch = 0) {
+  DeviceRequest request;
+  request.device = name;
+  request.validation = name != "cpu";
+  request.max_samples_per_dispatch = max_samples_per_dispatch;
+  return Device::open(request);
+}
+
+/// To be called at the end of a test: any message of the validation layers fails it.
+inline void expect_no_validation_messages(const Device& device) {
+  for (const std::string& message : device.validation_messages()) ADD_FAILURE() << message;
+}
+
+}  // namespace widestereo::test

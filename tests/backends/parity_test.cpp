@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT
+// Every back end must compute what the CPU reference computes: single steps to rounding, whole matches by
+// statistics (PatchMatch turns rounding differences into different winners at ties).
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "device_fixture.h"
+#include "geometry/camera_parameters.h"
+#include "matching/backend.h"
+#include "widestereo/image_io.h"
+#include "widestereo/matcher.h"
+#include "widestereo/synthesis.h"
+
+namespace widestereo::test {
+namespace {
+
+constexpr const char* other_devices[] = {"vulkan"};
+
+Options small_options(const RenderedPair&) {
+  Options options;
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  options.window_radius = 3;
+  options.first_iterations = 4;
+  options.second_iterations = 3;
+  return options;
+}
+
+std::vector<cv::Mat> images_of(const RenderedPair& pair) {
+  std::vector<cv::Mat> images;
+  for (const RenderedView& view : pair.views) images.push_back(view.image);
+  return images;
+}
+
+/// Runs only the first `dispatches` of a schedule and returns the hypotheses of every view.
+std::vector<cv::Mat> run_partly(Device& device, const RenderedPair& pair, Schedule schedule,
+                                std::size_t dispatches) {
+  schedule.dispatches.resize(dispatches);
+  std::vector<cv::Size> sizes;
+  for (const View& view : pair.rig.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  const auto backend = device.implementation().make_backend(sizes, schedule.constants);
+  std::vector<cv::Mat> hypotheses;
+  for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
+    const cv::Mat rays = ray_image(pair.rig.views[i].camera, {});
+    cv::Mat usable;
+    cv::extractChannel(rays, usable, 3);
+    cv::Mat intensity = to_intensity(pair.views[i].image, "test");
+    intensity.setTo(-1, usable == 0);
+    backend->set_rays(i, rays);
+    backend->set_intensity(i, intensity);
+    backend->set_hypotheses(i, cv::Mat(sizes[i], CV_32FC4, cv::Scalar(0, 0, 0, 2)));
+  }
+  backend->run(schedule, {});
+  for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
+    hypotheses.push_back(backend->hypotheses(i));
+  }
+  return hypotheses;
+}
+
+class Parity : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(Parity, InitialPlanesAndCostsAgree) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Device cpu = Device::open("cpu");
+  const RenderedPair pair = render_demo(96);
+  for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
+    Options options = small_options(pair);
+    options.warp = warp;
+    const Schedule schedule = make_schedule(pair.rig, options);
+    const cv::Mat_<cv::Vec4f> expected = run_partly(cpu, pair, schedule, 1)[0];
+    const cv::Mat_<cv::Vec4f> actual = run_partly(*device, pair, schedule, 1)[0];
+    int planes_differ = 0;
+    int validity_differs = 0;
+    std::vector<float> cost_differences;
+    for (int y = 0; y < expected.rows; ++y) {
+      for (int x = 0; x < expected.cols; ++x) {
+        const cv::Vec4f& e = expected(y, x);
+        const cv::Vec4f& a = actual(y, x);
+        const cv::Vec3f em(e[0], e[1], e[2]);
+        const cv::Vec3f am(a[0], a[1], a[2]);
+        planes_differ += cv::norm(em - am) > 1e-4 * (1 + cv::norm(em));
+        validity_differs += (e[3] >= 2) != (a[3] >= 2);
+        if (e[3] < 2 && a[3] < 2) cost_differences.push_back(std::abs(e[3] - a[3]));
+      }
+    }
+    ASSERT_GT(cost_differences.size(), 2000u);
+    std::sort(cost_differences.begin(), cost_differences.end());
+    const auto percentile = [&](double p) {
+      return cost_differences[static_cast<std::size_t>(p * (cost_differences.size() - 1.0))];
+    };
+    EXPECT_EQ(planes_differ, 0);
+    EXPECT_LE(validity_differs, 3);
+    EXPECT_LT(percentile(0.5), 1e-5);
+    EXPECT_LT(percentile(0.99), 2e-4);
+  }
+  expect_no_validation_messages(*device);
+}
+
+TEST_P(Parity, WholeMatchAgrees) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Device cpu = Device::open("cpu");
+  const RenderedPair pair = render_demo(128);
+  Options options = small_options(pair);
+  options.first_iterations = 8;
+  const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
+  const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
+  for (int view = 0; view < 2; ++view) {
+    const ViewResult& e = expected.views[view];
+    const ViewResult& a = actual.views[view];
+    // Ties and failures differ; where both are sure of themselves they must agree.
+    const cv::Mat sure = (e.reasons == 0) & (a.reasons == 0);
+    cv::Mat difference;
+    cv::absdiff(e.distance, a.distance, difference);
+    cv::divide(difference, e.distance, difference);
+    const double agreeing = cv::countNonZero((difference <= 0.005) & sure);
+    EXPECT_GT(cv::countNonZero(sure), 0.3 * static_cast<double>(sure.total()));
+    EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97);
+    EXPECT_NEAR(cv::mean(e.cost)[0], cv::mean(a.cost)[0], 0.01);
+  }
+  expect_no_validation_messages(*device);
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, Parity, ::testing::ValuesIn(other_devices));
+
+class EveryDevice : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(EveryDevice, FindsTheDemoSceneTwiceWithTheSameBits) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const RenderedPair pair = render_demo(128);
+  Options options = small_options(pair);
+  options.first_iterations = 10;
+  Matcher matcher(*device, pair.rig, options);
+  const StereoResult first = matcher.match(images_of(pair));
+  const StereoResult second = matcher.match(images_of(pair));
+  for (int view = 0; view < 2; ++view) {
+    EXPECT_EQ(cv::norm(first.views[view].hypotheses, second.views[view].hypotheses, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(first.views[view].confidence, second.views[view].confidence, cv::NORM_INF), 0);
+    const std::vector<RegionScores> scores =
+        evaluate(first.views[view].distance, first.views[view].normals, pair.views[view].truth,
+                 pair.rig.views[view], pair.rig.views[1 - view]);
+    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.25) << to_table(scores);
+    // Rejection must leave a better map than it was given.
+    const std::vector<RegionScores> accepted =
+        evaluate(accepted_distance(first.views[view]), {}, pair.views[view].truth,
+                 pair.rig.views[view], pair.rig.views[1 - view]);
+    EXPECT_LT(accepted[0].median_relative, scores[0].median_relative);
+  }
+  expect_no_validation_messages(*device);
+}
+
+TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Rig rig = render_demo(64).rig;
+  Camera& other = rig.views[1].camera;
+  other.model = CameraModel::kannala_brandt;
+  other.width = 80;
+  other.height = 56;
+  other.fx = other.fy = 22;
+  other.cx = 39.5;
+  other.cy = 27.5;
+  other.k1 = -0.01;
+  other.k2 = 0.004;
+  const RenderedPair pair = render_plane(rig, {0.1, 0.2, 1}, 1.5);
+  Options options;
+  options.min_distance = 0.5;
+  options.max_distance = 8;
+  options.window_radius = 3;
+  options.first_iterations = 8;
+  const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
+  for (int view = 0; view < 2; ++view) {
+    const std::vector<RegionScores> scores = evaluate(
+        result.views[view].distance, {}, pair.views[view].truth, rig.views[view], rig.views[1 - view]);
+    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.2) << to_table(scores);
+  }
+  expect_no_validation_messages(*device);
+}
+
+TEST_P(EveryDevice, UsesThreeViews) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Rig rig = render_demo(64).rig;
+  rig.views.push_back(rig.views[1]);
+  rig.views[2].name = "cam2";
+  rig.views[2].world_from_camera = Eigen::Translation3d(0, 0.12, 0) * rig.views[0].world_from_camera;
+  const RenderedPair pair = render_plane(rig, {0, 0.1, 1}, 1.2);
+  Options options;
+  options.min_distance = 0.5;
+  options.max_distance = 8;
+  options.window_radius = 3;
+  options.first_iterations = 6;
+  options.best_sources = 2;
+  const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
+  ASSERT_EQ(result.views.size(), 3u);
+  for (int view = 0; view < 3; ++view) {
+    const std::vector<RegionScores> scores =
+        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
+                 rig.views[(view + 1) % 3]);
+    EXPECT_LT(scores[0].bad_pixels.at(1.0), 0.3) << to_table(scores);
+  }
+  expect_no_validation_messages(*device);
+}
+
+TEST_P(EveryDevice, RejectsWhatItCannotMatch) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const RenderedPair pair = render_demo(64);
+  const Options options = small_options(pair);
+  Matcher matcher(*device, pair.rig, options);
+  std::vector<cv::Mat> images = images_of(pair);
+  EXPECT_THROW(matcher.match({images[0]}), Error);
+  EXPECT_THROW(matcher.match(images[0], images[1](cv::Rect(0, 0, 32, 64))), Error);
+  EXPECT_THROW(matcher.match(images[0], cv::Mat()), Error);
+  Options bad = options;
+  bad.max_distance = 0.1;
+  EXPECT_THROW(Matcher(*device, pair.rig, bad), Error);
+  Rig alone = pair.rig;
+  alone.views.pop_back();
+  EXPECT_THROW(Matcher(*device, alone, options), Error);
+  if (device->info().kind != DeviceKind::cpu) {
+    bad = options;
+    bad.propagation = Propagation::raster;
+    EXPECT_THROW(Matcher(*device, pair.rig, bad), Error);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan"));
+
+TEST(Checkerboard, ReachesRasterOrder) {
+  Device cpu = Device::open("cpu");
+  const RenderedPair pair = render_demo(96);
+  Options options = small_options(pair);
+  options.first_iterations = 6;
+  const StereoResult checkerboard = Matcher(cpu, pair.rig, options).match(images_of(pair));
+  options.propagation = Propagation::raster;
+  options.first_iterations = 8;  // 6 candidates a pixel instead of 8
+  const StereoResult raster = Matcher(cpu, pair.rig, options).match(images_of(pair));
+  const auto bad = [&](const StereoResult& result) {
+    return evaluate(result.views[0].distance, {}, pair.views[0].truth, pair.rig.views[0],
+                    pair.rig.views[1])[1]
+        .bad_pixels.at(1.0);
+  };
+  EXPECT_LT(bad(checkerboard), bad(raster) + 0.05);
+  EXPECT_NEAR(cv::mean(checkerboard.views[0].cost)[0], cv::mean(raster.views[0].cost)[0], 0.03);
+}
+
+TEST(DeviceChoice, UnknownNamesAreErrors) {
+  EXPECT_THROW(Device::open("gpu"), Error);
+  EXPECT_THROW(Device::open("vulkan:no such device"), Error);
+  EXPECT_THROW(Device::open(""), Error);
+}
+
+}  // namespace
+}  // namespace widestereo::test

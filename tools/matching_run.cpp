@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+#include "matching_run.h"
+
+#include <iostream>
+
+#include "progress_bar.h"
+#include "widestereo/error.h"
+
+namespace ws = widestereo;
+
+MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
+                         const std::vector<cv::Mat>& images) {
+  MatchingRun run;
+  run.options = settings.options();
+  ws::Device device = ws::Device::open(settings.device);
+  run.device = device.info();
+  if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
+  ws::Matcher matcher(device, rig, run.options);
+  {
+    ProgressBar bar("Matching on " + device.info().name);
+    run.result = matcher.match(images, [&bar](double share) { bar.show(share); });
+  }
+  const std::vector<std::string> messages = device.validation_messages();
+  if (!messages.empty()) {
+    throw ws::Error(std::to_string(messages.size()) +
+                    " message(s) of the Vulkan validation layers; the first: " + messages.front());
+  }
+  return run;
+}

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+// Runs a match for the command line: opens the device, shows progress, reports the devices passed over.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "match_settings.h"
+#include "widestereo/matcher.h"
+
+struct MatchingRun {
+  widestereo::Options options;
+  widestereo::DeviceInfo device;
+  widestereo::StereoResult result;
+};
+
+/// Throws Error also when validation was asked for and reported anything.
+MatchingRun match_images(const MatchSettings& settings, const widestereo::Rig& rig,
+                         const std::vector<cv::Mat>& images);

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// The folder of maps, pictures, clouds and the record that a match leaves.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "matching_run.h"
+#include "widestereo/evaluation.h"
+#include "widestereo/rig.h"
+
+/// Which files are written.
+struct FolderFormat {
+  std::vector<std::string> maps = {"tiff"};  ///< of distance: tiff, pfm, png
+  double png_scale = 1000;                   ///< units per metre of the 16-bit PNG
+  bool no_cloud = false;
+  bool no_pictures = false;
+  void add_to(CLI::App& command);
+};
+
+struct FolderContents {
+  const widestereo::Rig& rig;
+  const std::vector<cv::Mat>& images;
+  const MatchingRun& run;
+  nlohmann::ordered_json origin;                 ///< where the images came from
+  std::vector<widestereo::GroundTruth> truths;   ///< one for each view, or none
+  std::vector<widestereo::RegionScores> scores;  ///< of view 0, or none
+};
+
+/// Writes the folder, each file atomically and the record result.json last; returns the record.
+nlohmann::ordered_json write_result_folder(const std::filesystem::path& folder,
+                                           const FolderContents& contents,
+                                           const FolderFormat& format);
+
+/// Prints the record, or a summary of it for people.
+void report(const nlohmann::ordered_json& record, const std::filesystem::path& folder, bool as_json);
