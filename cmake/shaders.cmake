@@ -1,0 +1,49 @@
+# Compiles shaders/*.comp to SPIR-V, optimises and validates them where the tools exist, and embeds them in
+# widestereo_vulkan. Only the Vulkan headers are needed: the loader is opened at run time.
+find_path(WIDESTEREO_VULKAN_HEADERS vulkan/vulkan.h HINTS $ENV{VULKAN_SDK}/include)
+find_program(WIDESTEREO_GLSLANG glslangValidator HINTS $ENV{VULKAN_SDK}/bin)
+find_program(WIDESTEREO_SPIRV_OPT spirv-opt HINTS $ENV{VULKAN_SDK}/bin)
+find_program(WIDESTEREO_SPIRV_VAL spirv-val HINTS $ENV{VULKAN_SDK}/bin)
+mark_as_advanced(WIDESTEREO_VULKAN_HEADERS WIDESTEREO_GLSLANG WIDESTEREO_SPIRV_OPT WIDESTEREO_SPIRV_VAL)
+if(NOT WIDESTEREO_VULKAN_HEADERS)
+  message(FATAL_ERROR "The Vulkan headers are missing; install libvulkan-dev.")
+endif()
+if(NOT WIDESTEREO_GLSLANG)
+  message(FATAL_ERROR "glslangValidator is missing; install glslang-tools.")
+endif()
+if(NOT WIDESTEREO_SPIRV_OPT OR NOT WIDESTEREO_SPIRV_VAL)
+  message(STATUS "spirv-opt or spirv-val not found (package spirv-tools): shaders are built without")
+endif()
+
+set(WIDESTEREO_SPIRV_TARGET vulkan1.1)
+set(spirv_folder ${PROJECT_BINARY_DIR}/shaders)
+file(MAKE_DIRECTORY ${spirv_folder})
+
+set(spirv_modules)
+file(GLOB shader_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/*.comp)
+foreach(source IN LISTS shader_sources)
+  get_filename_component(name ${source} NAME_WE)
+  set(module ${spirv_folder}/${name}.spv)
+  set(steps COMMAND ${WIDESTEREO_GLSLANG} --quiet -V --target-env ${WIDESTEREO_SPIRV_TARGET}
+                    -I${PROJECT_SOURCE_DIR}/shaders --depfile ${module}.d -o ${module} ${source})
+  if(WIDESTEREO_SPIRV_OPT)
+    list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_OPT} --target-env=${WIDESTEREO_SPIRV_TARGET} -O
+                              ${module} -o ${module})
+  endif()
+  if(WIDESTEREO_SPIRV_VAL)
+    list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_VAL} --target-env ${WIDESTEREO_SPIRV_TARGET}
+                              ${module})
+  endif()
+  add_custom_command(OUTPUT ${module} ${steps} MAIN_DEPENDENCY ${source} DEPFILE ${module}.d
+                     COMMENT "Compiling shaders/${name}.comp" VERBATIM)
+  list(APPEND spirv_modules ${module})
+endforeach()
+
+add_custom_command(
+  OUTPUT ${spirv_folder}/shaders.cpp
+  COMMAND ${CMAKE_COMMAND} -DOUTPUT=${spirv_folder}/shaders.cpp "-DMODULES=${spirv_modules}"
+          -P ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
+  DEPENDS ${spirv_modules} ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
+  COMMENT "Embedding SPIR-V" VERBATIM)
+target_sources(widestereo_vulkan PRIVATE ${spirv_folder}/shaders.cpp)
+target_include_directories(widestereo_vulkan SYSTEM PUBLIC ${WIDESTEREO_VULKAN_HEADERS})

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. The images are 2D arrays with
+// one layer for each view, all as large as the largest view.
+
+// Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const int WINDOW_RADIUS = 5;
+layout(constant_id = 1) const int WARP = 0;
+layout(constant_id = 2) const int SOURCE_MODEL = -1;
+layout(constant_id = 3) const int VIEW_COUNT = 2;
+
+layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
+layout(set = 0, binding = 1) uniform sampler2DArray intensities;
+layout(set = 0, binding = 2, rgba32f) readonly uniform image2DArray rays;
+layout(set = 0, binding = 3, rgba32f) uniform image2DArray hypotheses;
+layout(set = 0, binding = 4, rgba32f) writeonly uniform image2DArray checks;
+layout(set = 0, binding = 5, std430) buffer NearestBlock { uint transfer_nearest[]; };
+layout(set = 0, binding = 6, std430) buffer WinnerBlock { uint transfer_winner[]; };
+layout(push_constant) uniform PassBlock { PassParameters pass; };
+
+vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, ivec3(p, view)); }
+
+float intensity_at(int view, ivec2 p) { return texelFetch(intensities, ivec3(p, view), 0).x; }
+
+vec4 intensity_taps(int view, ivec2 p) {
+  // The corner that the four texels share lies half a texel from any rounding trouble.
+  vec2 corner = (vec2(p) + 1.0f) / vec2(textureSize(intensities, 0).xy);
+  vec4 taps = textureGather(intensities, vec3(corner, float(view)));
+  return vec4(taps.w, taps.z, taps.x, taps.y);
+}
+
+vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }
+
+void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, ivec3(p, view), h); }
+
+void store_check(int view, ivec2 p, vec4 c) { imageStore(checks, ivec3(p, view), c); }
+
+int transfer_index(ivec2 p) { return p.y * parameters.cameras[pass.reference].size.x + p.x; }
+
+void transfer_reset(ivec2 p) {
+  transfer_nearest[transfer_index(p)] = 0u;
+  transfer_winner[transfer_index(p)] = 0xffffffffu;
+}
+
+uint transfer_nearest_at(ivec2 p) { return transfer_nearest[transfer_index(p)]; }
+
+void transfer_nearest_raise(ivec2 p, uint bits) {
+  atomicMax(transfer_nearest[transfer_index(p)], bits);
+}
+
+uint transfer_winner_at(ivec2 p) { return transfer_winner[transfer_index(p)]; }
+
+void transfer_winner_lower(ivec2 p, uint index) {
+  atomicMin(transfer_winner[transfer_index(p)], index);
+}
+
+// This thread's pixel of `view`; false outside the dispatch. With a colour, half the columns are launched.
+bool thread_pixel(int view, out ivec2 pixel) {
+  pixel = ivec2(gl_GlobalInvocationID.xy);
+  pixel.y += pass.first_row;
+  if (pass.colour >= 0) pixel.x = 2 * pixel.x + ((pixel.y + pass.colour) & 1);
+  return pixel.x < parameters.cameras[view].size.x && pixel.y < pass.last_row;
+}

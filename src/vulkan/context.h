@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "vulkan/functions.h"
+#include "vulkan/handle.h"
+
+namespace widestereo {
+
+/// What an application hands in to have matching done on its own device. The device must be of
+/// Vulkan 1.1 or newer and the queue family must compute; no feature or extension needs to be
+/// enabled. Nothing handed in is ever destroyed. Vulkan requires that nobody else uses `queue`
+/// during a call that submits.
+struct VulkanHandles {
+  PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
+  VkInstance instance = VK_NULL_HANDLE;
+  VkPhysicalDevice physical_device = VK_NULL_HANDLE;
+  VkDevice device = VK_NULL_HANDLE;
+  VkQueue queue = VK_NULL_HANDLE;
+  std::uint32_t queue_family = 0;
+};
+
+/// A device with one compute queue, its own or an application's, and the functions to drive it.
+class VulkanContext {
+ public:
+  /// Makes a device of its own. Throws Error naming what the physical device lacks.
+  VulkanContext(PFN_vkGetInstanceProcAddr get, VkInstance instance,
+                VkPhysicalDevice physical_device);
+  /// Uses an application's device. Throws Error naming what it lacks.
+  explicit VulkanContext(const VulkanHandles& adopted);
+  VulkanContext(const VulkanContext&) = delete;
+  VulkanContext& operator=(const VulkanContext&) = delete;
+
+  const DeviceFunctions& vk() const { return functions_; }
+  VkDevice device() const { return handles_.device; }
+  VkQueue queue() const { return handles_.queue; }
+  std::uint32_t queue_family() const { return handles_.queue_family; }
+  const VkPhysicalDeviceProperties& properties() const { return properties_; }
+  std::string name() const { return properties_.deviceName; }
+  std::uint32_t timestamp_bits() const { return timestamp_bits_; }  ///< 0: cannot measure time
+
+  /// Largest extent and layer count of such an image; zeros where it is not supported at all.
+  VkImageFormatProperties image_limits(VkFormat format, VkImageUsageFlags usage) const;
+  /// First memory type of `allowed` with all of `wanted`, or VK_MAX_MEMORY_TYPES.
+  std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
+  /// Throws Error when a call failed; `action` completes "could not ...".
+  void check(VkResult result, const std::string& action) const;
+
+  template <class T>
+  Handle<T> own(T object, typename Handle<T>::Destroy destroy) const {
+    return Handle<T>(handles_.device, object, destroy);
+  }
+
+ private:
+  void require_usable();
+  void create_device();
+  void load_functions();
+
+  /// Destroys the device when it is ours.
+  struct OwnedDevice {
+    VkDevice device = VK_NULL_HANDLE;
+    PFN_vkDestroyDevice destroy = nullptr;
+    ~OwnedDevice() {
+      if (destroy != nullptr) destroy(device, nullptr);
+    }
+  };
+
+  VulkanHandles handles_;
+  InstanceFunctions instance_functions_;
+  VkPhysicalDeviceProperties properties_{};
+  OwnedDevice owned_;
+  DeviceFunctions functions_;
+  std::uint32_t timestamp_bits_ = 0;
+};
+
+}  // namespace widestereo

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#include "vulkan/loader.h"
+
+#include <dlfcn.h>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+#ifdef __APPLE__
+constexpr const char* library_names[] = {"libvulkan.1.dylib", "libMoltenVK.dylib"};
+#else
+constexpr const char* library_names[] = {"libvulkan.so.1", "libvulkan.so"};
+#endif
+
+}  // namespace
+
+VulkanLoader::VulkanLoader() {
+  for (const char* name : library_names) {
+    library_ = dlopen(name, RTLD_NOW | RTLD_LOCAL);
+    if (library_ != nullptr) break;
+  }
+  if (library_ != nullptr) {
+    get_ = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library_, "vkGetInstanceProcAddr"));
+  }
+  if (get_ == nullptr) {
+    if (library_ != nullptr) dlclose(library_);
+    throw Error("The Vulkan loader is not installed; install it (libvulkan1) and a driver.");
+  }
+}
+
+VulkanLoader::~VulkanLoader() { dlclose(library_); }
+
+}  // namespace widestereo

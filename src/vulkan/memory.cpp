@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+#include "vulkan/memory.h"
+
+#include <limits>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+std::string mebibytes(VkDeviceSize bytes) {
+  return std::to_string((bytes + (1u << 20) - 1) >> 20) + " MiB";
+}
+
+Handle<VkDeviceMemory> allocate(const VulkanContext& context,
+                                const VkMemoryRequirements& requirements, std::uint32_t type,
+                                const std::string& purpose) {
+  VkMemoryAllocateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+  info.allocationSize = requirements.size;
+  info.memoryTypeIndex = type;
+  VkDeviceMemory memory = VK_NULL_HANDLE;
+  context.check(context.vk().vkAllocateMemory(context.device(), &info, nullptr, &memory),
+                "allocate " + mebibytes(requirements.size) + " for " + purpose);
+  return context.own(memory, context.vk().vkFreeMemory);
+}
+
+/// Device memory is a wish: any type will do.
+std::uint32_t device_memory_type(const VulkanContext& context, std::uint32_t allowed) {
+  const std::uint32_t type = context.memory_type(allowed, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
+  return type < VK_MAX_MEMORY_TYPES ? type : context.memory_type(allowed, 0);
+}
+
+/// A coherent host type exists on every device.
+std::uint32_t host_memory_type(const VulkanContext& context, std::uint32_t allowed) {
+  constexpr VkMemoryPropertyFlags coherent =
+      VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+  const std::uint32_t cached =
+      context.memory_type(allowed, coherent | VK_MEMORY_PROPERTY_HOST_CACHED_BIT);
+  return cached < VK_MAX_MEMORY_TYPES ? cached : context.memory_type(allowed, coherent);
+}
+
+Buffer make_buffer(const VulkanContext& context, VkDeviceSize bytes, VkBufferUsageFlags usage,
+                   std::uint32_t (*choose_type)(const VulkanContext&, std::uint32_t),
+                   const std::string& purpose) {
+  const DeviceFunctions& vk = context.vk();
+  VkBufferCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+  info.size = bytes;
+  info.usage = usage;
+  info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
+  VkBuffer buffer = VK_NULL_HANDLE;
+  context.check(vk.vkCreateBuffer(context.device(), &info, nullptr, &buffer), "make " + purpose);
+  Buffer result;
+  result.handle = context.own(buffer, vk.vkDestroyBuffer);
+  VkMemoryRequirements requirements{};
+  vk.vkGetBufferMemoryRequirements(context.device(), buffer, &requirements);
+  result.memory =
+      allocate(context, requirements, choose_type(context, requirements.memoryTypeBits), purpose);
+  result.bytes = requirements.size;
+  context.check(vk.vkBindBufferMemory(context.device(), buffer, result.memory.get(), 0),
+                "bind the memory of " + purpose);
+  return result;
+}
+
+void require_image_limits(const VulkanContext& context, VkFormat format, cv::Size size, int layers,
+                          VkImageUsageFlags usage, const std::string& purpose) {
+  const VkImageFormatProperties limits = context.image_limits(format, usage);
+  const auto refuse = [&](const std::string& limit, std::uint32_t offered) {
+    throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " (" +
+                std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels, " +
+                std::to_string(layers) + " layers): its " + limit + " is " +
+                std::to_string(offered) + "; use smaller images or another device.");
+  };
+  if (size.width > static_cast<long long>(limits.maxExtent.width)) {
+    refuse("largest image width", limits.maxExtent.width);
+  }
+  if (size.height > static_cast<long long>(limits.maxExtent.height)) {
+    refuse("largest image height", limits.maxExtent.height);
+  }
+  if (layers > static_cast<long long>(limits.maxArrayLayers)) {
+    refuse("maxImageArrayLayers", limits.maxArrayLayers);
+  }
+}
+
+}  // namespace
+
+Buffer make_device_buffer(const VulkanContext& context, VkDeviceSize bytes,
+                          VkBufferUsageFlags usage, const std::string& purpose) {
+  const VkDeviceSize limit = (usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) != 0
+                                 ? context.properties().limits.maxStorageBufferRange
+                                 : std::numeric_limits<VkDeviceSize>::max();
+  if (bytes > limit) {
+    throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " of " +
+                mebibytes(bytes) + ": its maxStorageBufferRange is " + mebibytes(limit) +
+                "; use smaller images or another device.");
+  }
+  return make_buffer(context, bytes, usage, device_memory_type, purpose);
+}
+
+Buffer make_staging_buffer(const VulkanContext& context, VkDeviceSize bytes) {
+  Buffer buffer = make_buffer(context, bytes,
+                              VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                              host_memory_type, "the staging buffer");
+  context.check(context.vk().vkMapMemory(context.device(), buffer.memory.get(), 0, VK_WHOLE_SIZE, 0,
+                                         &buffer.mapped),
+                "map the staging buffer");
+  return buffer;
+}
+
+LayeredImage make_image(const VulkanContext& context, VkFormat format, cv::Size size, int layers,
+                        VkImageUsageFlags usage, const std::string& purpose) {
+  require_image_limits(context, format, size, layers, usage, purpose);
+  const DeviceFunctions& vk = context.vk();
+  VkImageCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO;
+  info.imageType = VK_IMAGE_TYPE_2D;
+  info.format = format;
+  info.extent = {static_cast<std::uint32_t>(size.width), static_cast<std::uint32_t>(size.height),
+                 1};
+  info.mipLevels = 1;
+  info.arrayLayers = static_cast<std::uint32_t>(layers);
+  info.samples = VK_SAMPLE_COUNT_1_BIT;
+  info.tiling = VK_IMAGE_TILING_OPTIMAL;
+  info.usage = usage;
+  info.sharingMode = VK_SHARING_MODE_EXCLUSIVE;
+  info.initialLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+  VkImage image = VK_NULL_HANDLE;
+  context.check(vk.vkCreateImage(context.device(), &info, nullptr, &image), "make " + purpose);
+  LayeredImage result;
+  result.handle = context.own(image, vk.vkDestroyImage);
+
+  VkMemoryRequirements requirements{};
+  vk.vkGetImageMemoryRequirements(context.device(), image, &requirements);
+  result.memory = allocate(context, requirements,
+                           device_memory_type(context, requirements.memoryTypeBits), purpose);
+  result.bytes = requirements.size;
+  context.check(vk.vkBindImageMemory(context.device(), image, result.memory.get(), 0),
+                "bind the memory of " + purpose);
+
+  VkImageViewCreateInfo view_info{};
+  view_info.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO;
+  view_info.image = image;
+  view_info.viewType = VK_IMAGE_VIEW_TYPE_2D_ARRAY;
+  view_info.format = format;
+  view_info.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, info.arrayLayers};
+  VkImageView view = VK_NULL_HANDLE;
+  context.check(vk.vkCreateImageView(context.device(), &view_info, nullptr, &view),
+                "make a view of " + purpose);
+  result.view = context.own(view, vk.vkDestroyImageView);
+  return result;
+}
+
+}  // namespace widestereo

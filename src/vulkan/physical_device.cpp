@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+#include "vulkan/physical_device.h"
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "kernel/host.h"
+
+namespace widestereo {
+namespace {
+
+std::vector<VkQueueFamilyProperties> queue_families(const InstanceFunctions& vk,
+                                                    VkPhysicalDevice device) {
+  std::uint32_t count = 0;
+  vk.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
+  std::vector<VkQueueFamilyProperties> families(count);
+  vk.vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+  return families;
+}
+
+std::string type_name(VkPhysicalDeviceType type) {
+  switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return "discrete gpu";
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+      return "integrated gpu";
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return "virtual gpu";
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+      return "cpu";
+    default:
+      return "other";
+  }
+}
+
+std::string version_text(std::uint32_t version) {
+  return std::to_string(VK_API_VERSION_MAJOR(version)) + "." +
+         std::to_string(VK_API_VERSION_MINOR(version)) + "." +
+         std::to_string(VK_API_VERSION_PATCH(version));
+}
+
+std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
+  constexpr const char* digits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : bytes) {
+    text += digits[byte >> 4];
+    text += digits[byte & 15];
+  }
+  return text;
+}
+
+bool has_format(const InstanceFunctions& vk, VkPhysicalDevice device, VkFormat format,
+                VkFormatFeatureFlags features) {
+  VkFormatProperties properties{};
+  vk.vkGetPhysicalDeviceFormatProperties(device, format, &properties);
+  return (properties.optimalTilingFeatures & features) == features;
+}
+
+std::string too_low(const char* limit, std::uint64_t needed, std::uint64_t offered) {
+  return std::string(limit) + " is " + std::to_string(offered) + ", but " + std::to_string(needed) +
+         " is needed; use another device.";
+}
+
+}  // namespace
+
+VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysicalDevice device) {
+  VkPhysicalDeviceProperties2 properties{};
+  properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+  vk.vkGetPhysicalDeviceProperties2(device, &properties);
+  return properties.properties;
+}
+
+bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name) {
+  std::uint32_t count = 0;
+  if (vk.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr) != VK_SUCCESS) {
+    return false;
+  }
+  std::vector<VkExtensionProperties> extensions(count);
+  if (vk.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data()) !=
+      VK_SUCCESS) {
+    return false;
+  }
+  return std::any_of(extensions.begin(), extensions.end(), [name](const auto& extension) {
+    return std::strcmp(extension.extensionName, name) == 0;
+  });
+}
+
+std::optional<std::uint32_t> compute_queue_family(const InstanceFunctions& vk,
+                                                  VkPhysicalDevice device) {
+  std::optional<std::uint32_t> found;
+  const auto families = queue_families(vk, device);
+  for (std::uint32_t i = 0; i < families.size(); ++i) {
+    if ((families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) continue;
+    if (families[i].timestampValidBits > 0) return i;
+    if (!found) found = i;
+  }
+  return found;
+}
+
+std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice device,
+                             std::uint32_t queue_family) {
+  return queue_families(vk, device).at(queue_family).timestampValidBits;
+}
+
+std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
+  const VkPhysicalDeviceProperties properties = properties_of(vk, device);
+  const VkPhysicalDeviceLimits& limits = properties.limits;
+  if (properties.apiVersion < VK_API_VERSION_1_1) {
+    return "it offers Vulkan " + version_text(properties.apiVersion) +
+           ", but 1.1 is needed; update the driver.";
+  }
+  if (!compute_queue_family(vk, device)) return "it has no compute queue; use another device.";
+  if (!has_format(vk, device, VK_FORMAT_R32G32B32A32_SFLOAT,
+                  VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_SRC_BIT |
+                      VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
+    return "it lacks storage images of four 32-bit floats; use another device.";
+  }
+  if (!has_format(vk, device, VK_FORMAT_R32_SFLOAT,
+                  VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
+    return "it lacks sampled images of 32-bit floats; use another device.";
+  }
+  if (limits.maxPushConstantsSize < sizeof(kernel::PassParameters)) {
+    return too_low("maxPushConstantsSize", sizeof(kernel::PassParameters),
+                   limits.maxPushConstantsSize);
+  }
+  if (limits.maxUniformBufferRange < sizeof(kernel::MatchParameters)) {
+    return too_low("maxUniformBufferRange", sizeof(kernel::MatchParameters),
+                   limits.maxUniformBufferRange);
+  }
+  if (limits.maxComputeWorkGroupInvocations < 64) {
+    return too_low("maxComputeWorkGroupInvocations", 64, limits.maxComputeWorkGroupInvocations);
+  }
+  if (limits.maxPerStageDescriptorStorageImages < 3) {
+    return too_low("maxPerStageDescriptorStorageImages", 3,
+                   limits.maxPerStageDescriptorStorageImages);
+  }
+  return "";
+}
+
+DeviceInfo describe(const InstanceFunctions& vk, VkPhysicalDevice device, int index) {
+  DeviceInfo info;
+  info.kind = DeviceKind::vulkan;
+  info.id = "vulkan:" + std::to_string(index);
+  const VkPhysicalDeviceProperties plain = properties_of(vk, device);
+  info.name = plain.deviceName;
+  info.type = type_name(plain.deviceType);
+  info.driver = version_text(plain.driverVersion);
+  info.unusable = why_unusable(vk, device);
+  if (plain.apiVersion < VK_API_VERSION_1_1) return info;
+
+  VkPhysicalDeviceDriverProperties driver{};
+  driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;
+  VkPhysicalDeviceIDProperties identity{};
+  identity.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES;
+  if (has_device_extension(vk, device, VK_KHR_DRIVER_PROPERTIES_EXTENSION_NAME)) {
+    identity.pNext = &driver;
+  }
+  VkPhysicalDeviceProperties2 properties{};
+  properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+  properties.pNext = &identity;
+  vk.vkGetPhysicalDeviceProperties2(device, &properties);
+  info.uuid = hexadecimal(identity.deviceUUID);
+  if (driver.driverName[0] != '\0') {
+    info.driver = std::string(driver.driverName) + " " + driver.driverInfo;
+  }
+  return info;
+}
+
+}  // namespace widestereo

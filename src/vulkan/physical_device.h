@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "vulkan/functions.h"
+#include "widestereo/device.h"
+
+namespace widestereo {
+
+VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysicalDevice device);
+
+/// Name, type, driver and UUID; `unusable` says what the kernels need and the device lacks.
+DeviceInfo describe(const InstanceFunctions& vk, VkPhysicalDevice device, int index);
+
+/// The device's reason for being unusable in one sentence, empty if it can run the kernels.
+std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device);
+
+/// First queue family that computes, preferably one that can also measure time.
+std::optional<std::uint32_t> compute_queue_family(const InstanceFunctions& vk,
+                                                  VkPhysicalDevice device);
+
+/// Bits of a timestamp of a queue family, 0 where it has none.
+std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice device,
+                             std::uint32_t queue_family);
+
+bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name);
+
+}  // namespace widestereo

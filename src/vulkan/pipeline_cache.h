@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "vulkan/context.h"
+
+namespace widestereo {
+
+/// Compiled pipelines kept in a file between runs. The file carries a checksum and is used only if
+/// it is intact and of this very device and driver; anything else is ignored and replaced.
+class PipelineCache {
+ public:
+  /// `path`: empty for a cache that is not kept.
+  PipelineCache(const VulkanContext& context, std::filesystem::path path);
+
+  VkPipelineCache get() const { return cache_.get(); }
+  bool loaded_from_file() const { return !saved_.empty(); }
+  /// Writes the file if the driver's data have changed. Throws Error when it cannot be written.
+  void save();
+
+ private:
+  std::vector<char> data() const;
+
+  const VulkanContext& context_;
+  std::filesystem::path path_;
+  std::vector<char> saved_;  // what the file holds
+  Handle<VkPipelineCache> cache_;
+};
+
+}  // namespace widestereo

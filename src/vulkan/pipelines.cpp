@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "vulkan/pipelines.h"
+
+#include <string>
+
+#include "vulkan/shaders.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+/// In the order of their constant_id.
+constexpr std::array<VkSpecializationMapEntry, 4> specialisation_entries = {{
+    {0, offsetof(KernelConstants, window_radius), sizeof(int)},
+    {1, offsetof(KernelConstants, warp), sizeof(int)},
+    {2, offsetof(KernelConstants, source_model), sizeof(int)},
+    {3, offsetof(KernelConstants, view_count), sizeof(int)},
+}};
+
+Handle<VkShaderModule> make_module(const VulkanContext& context, const std::string& name) {
+  const std::span<const std::uint32_t> code = shader_code(name);
+  VkShaderModuleCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
+  info.codeSize = code.size_bytes();
+  info.pCode = code.data();
+  VkShaderModule module = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateShaderModule(context.device(), &info, nullptr, &module),
+                "load the kernel " + name);
+  return context.own(module, context.vk().vkDestroyShaderModule);
+}
+
+Handle<VkPipeline> make_pipeline(const VulkanContext& context, const std::string& name,
+                                 const KernelConstants& constants, VkPipelineLayout layout,
+                                 VkPipelineCache cache) {
+  const Handle<VkShaderModule> module = make_module(context, name);
+  const VkSpecializationInfo specialisation = {
+      static_cast<std::uint32_t>(specialisation_entries.size()), specialisation_entries.data(),
+      sizeof constants, &constants};
+  VkComputePipelineCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = module.get();
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &specialisation;
+  info.layout = layout;
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  context.check(
+      context.vk().vkCreateComputePipelines(context.device(), cache, 1, &info, nullptr, &pipeline),
+      "compile the kernel " + name);
+  return context.own(pipeline, context.vk().vkDestroyPipeline);
+}
+
+}  // namespace
+
+Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants,
+                     VkPipelineCache cache) {
+  make_layouts(context);
+  for (int i = 0; i < kernel_count; ++i) {
+    const Kernel kernel = static_cast<Kernel>(i);
+    if (kernel == Kernel::iterate_raster) continue;
+    pipelines_[static_cast<std::size_t>(i)] =
+        make_pipeline(context, to_string(kernel), constants, layout(), cache);
+  }
+}
+
+void Pipelines::make_layouts(const VulkanContext& context) {
+  const auto binding = [](Binding number, VkDescriptorType type) {
+    return VkDescriptorSetLayoutBinding{number, type, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+  };
+  const std::array bindings = {
+      binding(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
+      binding(binding_intensities, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
+      binding(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_checks, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
+      binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
+  };
+  VkDescriptorSetLayoutCreateInfo set_info{};
+  set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+  set_info.bindingCount = static_cast<std::uint32_t>(bindings.size());
+  set_info.pBindings = bindings.data();
+  VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+  context.check(
+      context.vk().vkCreateDescriptorSetLayout(context.device(), &set_info, nullptr, &set_layout),
+      "make a descriptor set layout");
+  set_layout_ = context.own(set_layout, context.vk().vkDestroyDescriptorSetLayout);
+
+  const VkPushConstantRange push_constants = {VK_SHADER_STAGE_COMPUTE_BIT, 0,
+                                              sizeof(kernel::PassParameters)};
+  VkPipelineLayoutCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
+  info.setLayoutCount = 1;
+  info.pSetLayouts = &set_layout;
+  info.pushConstantRangeCount = 1;
+  info.pPushConstantRanges = &push_constants;
+  VkPipelineLayout layout = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreatePipelineLayout(context.device(), &info, nullptr, &layout),
+                "make a pipeline layout");
+  layout_ = context.own(layout, context.vk().vkDestroyPipelineLayout);
+}
+
+VkPipeline Pipelines::get(Kernel kernel) const {
+  const VkPipeline pipeline = pipelines_[static_cast<std::size_t>(kernel)].get();
+  if (pipeline == VK_NULL_HANDLE) {
+    throw Error(std::string("The kernel ") + to_string(kernel) +
+                " is sequential and runs on the CPU only; choose the device \"cpu\".");
+  }
+  return pipeline;
+}
+
+}  // namespace widestereo

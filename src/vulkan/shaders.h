@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+namespace widestereo {
+
+/// SPIR-V of shaders/NAME.comp, embedded by cmake/shaders.cmake; empty for an unknown name.
+std::span<const std::uint32_t> shader_code(std::string_view name);
+
+}  // namespace widestereo

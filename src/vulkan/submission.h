@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include "vulkan/context.h"
+
+namespace widestereo {
+
+/// A command buffer of our own with the fence that tells when it has finished and timestamps in
+/// between.
+class Submission {
+ public:
+  Submission(const VulkanContext& context, VkCommandPool pool, std::uint32_t max_timestamps);
+  ~Submission();
+  Submission(const Submission&) = delete;
+  Submission& operator=(const Submission&) = delete;
+
+  /// Starts recording; must not be in flight.
+  VkCommandBuffer begin();
+  /// Notes the time when all earlier commands have finished. Does nothing on devices without a
+  /// clock.
+  void write_timestamp();
+  /// Ends recording and submits.
+  void submit();
+  bool in_flight() const { return in_flight_; }
+  /// Waits for the end, if in flight.
+  void wait();
+  /// Milliseconds between each two consecutive timestamps of the finished submission; empty without
+  /// a clock.
+  std::vector<double> elapsed() const;
+
+ private:
+  const VulkanContext& context_;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;  // belongs to the pool
+  Handle<VkFence> fence_;
+  Handle<VkQueryPool> queries_;
+  std::uint32_t max_timestamps_ = 0;
+  std::uint32_t timestamps_ = 0;
+  bool in_flight_ = false;
+};
+
+}  // namespace widestereo

@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: MIT
+#include "vulkan/vulkan_backend.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+constexpr VkFormat map_format = VK_FORMAT_R32G32B32A32_SFLOAT;
+constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
+constexpr std::size_t max_bands_per_submission = 256;
+constexpr std::uint32_t workgroup = 8;  // of shaders/bindings.glsl, both ways
+
+/// About 100 ms of a slow device of each kind.
+long long default_max_samples(VkPhysicalDeviceType type) {
+  switch (type) {
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+      return 2'000'000'000;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+      return 300'000'000;
+    default:
+      return 6'000'000;
+  }
+}
+
+cv::Size largest(const std::vector<cv::Size>& sizes) {
+  cv::Size size;
+  for (const cv::Size& one : sizes) {
+    size = {std::max(size.width, one.width), std::max(size.height, one.height)};
+  }
+  return size;
+}
+
+VkDeviceSize largest_area(const std::vector<cv::Size>& sizes) {
+  VkDeviceSize area = 0;
+  for (const cv::Size& size : sizes) {
+    area = std::max(area,
+                    static_cast<VkDeviceSize>(size.width) * static_cast<VkDeviceSize>(size.height));
+  }
+  return area;
+}
+
+VkBufferImageCopy whole_layer(int layer, cv::Size size) {
+  VkBufferImageCopy region{};
+  region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, static_cast<std::uint32_t>(layer), 1};
+  region.imageExtent = {static_cast<std::uint32_t>(size.width),
+                        static_cast<std::uint32_t>(size.height), 1};
+  return region;
+}
+
+std::uint32_t workgroups(int threads) {
+  return (static_cast<std::uint32_t>(threads) + workgroup - 1) / workgroup;
+}
+
+Handle<VkSampler> make_sampler(const VulkanContext& context) {
+  VkSamplerCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO;
+  info.magFilter = VK_FILTER_NEAREST;
+  info.minFilter = VK_FILTER_NEAREST;
+  info.mipmapMode = VK_SAMPLER_MIPMAP_MODE_NEAREST;
+  info.addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
+  info.addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
+  info.addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
+  VkSampler sampler = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateSampler(context.device(), &info, nullptr, &sampler),
+                "make a sampler");
+  return context.own(sampler, context.vk().vkDestroySampler);
+}
+
+Handle<VkCommandPool> make_command_pool(const VulkanContext& context) {
+  VkCommandPoolCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+  info.queueFamilyIndex = context.queue_family();
+  VkCommandPool pool = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateCommandPool(context.device(), &info, nullptr, &pool),
+                "make a command pool");
+  return context.own(pool, context.vk().vkDestroyCommandPool);
+}
+
+}  // namespace
+
+VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv::Size>& sizes,
+                             const KernelConstants& constants, PipelineCache& cache,
+                             long long max_samples)
+    : context_(context),
+      sizes_(sizes),
+      constants_(constants),
+      max_samples_(max_samples > 0 ? max_samples
+                                   : default_max_samples(context.properties().deviceType)),
+      pipelines_(context, constants, cache.get()),
+      staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
+      sampler_(make_sampler(context)),
+      command_pool_(make_command_pool(context)) {
+  cache.save();
+  make_images(context);
+  make_descriptor_set();
+  for (auto& submission : submissions_) {
+    submission =
+        std::make_unique<Submission>(context, command_pool_.get(), max_bands_per_submission + 1);
+  }
+  clear_images();
+}
+
+VulkanBackend::~VulkanBackend() = default;
+
+void VulkanBackend::make_images(const VulkanContext& context) {
+  const cv::Size size = largest(sizes_);
+  const int layers = static_cast<int>(sizes_.size());
+  const auto make_map = [&](const char* purpose) {
+    return make_image(context, map_format, size, layers,
+                      VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
+                          VK_IMAGE_USAGE_TRANSFER_DST_BIT,
+                      purpose);
+  };
+  intensities_ =
+      make_image(context, intensity_format, size, layers,
+                 VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT, "the images");
+  rays_ = make_map("the viewing rays");
+  hypotheses_ = make_map("the planes");
+  checks_ = make_map("the consistency maps");
+  parameters_ = make_device_buffer(
+      context, sizeof(kernel::MatchParameters),
+      VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the parameters");
+  const VkDeviceSize transfer_bytes = largest_area(sizes_) * sizeof(std::uint32_t);
+  for (Buffer* buffer : {&transfer_nearest_, &transfer_winner_}) {
+    *buffer = make_device_buffer(context, transfer_bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                                 "a transfer buffer");
+  }
+}
+
+void VulkanBackend::make_descriptor_set() {
+  const DeviceFunctions& vk = context_.vk();
+  const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
+      {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1},
+      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1},
+      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 3},
+      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2},
+  }};
+  VkDescriptorPoolCreateInfo pool_info{};
+  pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+  pool_info.maxSets = 1;
+  pool_info.poolSizeCount = static_cast<std::uint32_t>(pool_sizes.size());
+  pool_info.pPoolSizes = pool_sizes.data();
+  VkDescriptorPool pool = VK_NULL_HANDLE;
+  context_.check(vk.vkCreateDescriptorPool(context_.device(), &pool_info, nullptr, &pool),
+                 "make a descriptor pool");
+  descriptor_pool_ = context_.own(pool, vk.vkDestroyDescriptorPool);
+
+  const VkDescriptorSetLayout layout = pipelines_.set_layout();
+  VkDescriptorSetAllocateInfo set_info{};
+  set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  set_info.descriptorPool = pool;
+  set_info.descriptorSetCount = 1;
+  set_info.pSetLayouts = &layout;
+  context_.check(vk.vkAllocateDescriptorSets(context_.device(), &set_info, &descriptor_set_),
+                 "make a descriptor set");
+
+  std::vector<VkWriteDescriptorSet> writes;
+  const auto write = [&](Binding binding, VkDescriptorType type, const VkDescriptorImageInfo* image,
+                         const VkDescriptorBufferInfo* buffer) {
+    VkWriteDescriptorSet& one = writes.emplace_back();
+    one.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+    one.dstSet = descriptor_set_;
+    one.dstBinding = binding;
+    one.descriptorCount = 1;
+    one.descriptorType = type;
+    one.pImageInfo = image;
+    one.pBufferInfo = buffer;
+  };
+  const auto image_info = [&](const LayeredImage& image, VkSampler sampler) {
+    return VkDescriptorImageInfo{sampler, image.view.get(), VK_IMAGE_LAYOUT_GENERAL};
+  };
+  const auto buffer_info = [](const Buffer& buffer) {
+    return VkDescriptorBufferInfo{buffer.handle.get(), 0, VK_WHOLE_SIZE};
+  };
+  const VkDescriptorImageInfo intensities = image_info(intensities_, sampler_.get());
+  const VkDescriptorImageInfo rays = image_info(rays_, VK_NULL_HANDLE);
+  const VkDescriptorImageInfo hypotheses = image_info(hypotheses_, VK_NULL_HANDLE);
+  const VkDescriptorImageInfo checks = image_info(checks_, VK_NULL_HANDLE);
+  const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
+  const VkDescriptorBufferInfo nearest = buffer_info(transfer_nearest_);
+  const VkDescriptorBufferInfo winner = buffer_info(transfer_winner_);
+  write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
+  write(binding_intensities, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &intensities, nullptr);
+  write(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &rays, nullptr);
+  write(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &hypotheses, nullptr);
+  write(binding_checks, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &checks, nullptr);
+  write(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &nearest);
+  write(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &winner);
+  vk.vkUpdateDescriptorSets(context_.device(), static_cast<std::uint32_t>(writes.size()),
+                            writes.data(), 0, nullptr);
+}
+
+// All images stay in the general layout for good, so that memory barriers are all that is ever
+// needed.
+void VulkanBackend::clear_images() {
+  const DeviceFunctions& vk = context_.vk();
+  const VkCommandBuffer commands = submissions_[0]->begin();
+  const VkImageSubresourceRange all = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0,
+                                       VK_REMAINING_ARRAY_LAYERS};
+  for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
+    VkImageMemoryBarrier to_general{};
+    to_general.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
+    to_general.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    to_general.oldLayout = VK_IMAGE_LAYOUT_UNDEFINED;
+    to_general.newLayout = VK_IMAGE_LAYOUT_GENERAL;
+    to_general.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    to_general.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    to_general.image = image->handle.get();
+    to_general.subresourceRange = all;
+    vk.vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT,
+                            VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0, nullptr, 0, nullptr, 1,
+                            &to_general);
+    const VkClearColorValue zero{};
+    vk.vkCmdClearColorImage(commands, image->handle.get(), VK_IMAGE_LAYOUT_GENERAL, &zero, 1, &all);
+  }
+  submissions_[0]->submit();
+  submissions_[0]->wait();
+}
+
+void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stages,
+                            VkAccessFlags access) const {
+  VkMemoryBarrier memory{};
+  memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+  memory.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  memory.dstAccessMask = access;
+  context_.vk().vkCmdPipelineBarrier(
+      commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT, stages, 0, 1,
+      &memory, 0, nullptr, 0, nullptr);
+}
+
+void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map, int type) {
+  const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
+  if (map.size() != size || map.type() != type) {
+    throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) +
+                "x" + std::to_string(map.rows) + " of type " + cv::typeToString(map.type()) +
+                ", but " + std::to_string(size.width) + "x" + std::to_string(size.height) + " of " +
+                cv::typeToString(type) + " is needed.");
+  }
+  map.copyTo(cv::Mat(size, type, staging_.mapped));
+  const VkCommandBuffer commands = submissions_[0]->begin();
+  barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
+          VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT);
+  const VkBufferImageCopy region = whole_layer(view, size);
+  context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
+                                       VK_IMAGE_LAYOUT_GENERAL, 1, &region);
+  submissions_[0]->submit();
+  submissions_[0]->wait();
+}
+
+cv::Mat VulkanBackend::download(const LayeredImage& image, int view) {
+  const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
+  const VkCommandBuffer commands = submissions_[0]->begin();
+  barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
+          VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT);
+  const VkBufferImageCopy region = whole_layer(view, size);
+  context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(), VK_IMAGE_LAYOUT_GENERAL,
+                                       staging_.handle.get(), 1, &region);
+  barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+  submissions_[0]->submit();
+  submissions_[0]->wait();
+  return cv::Mat(size, CV_32FC4, staging_.mapped).clone();
+}
+
+void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view, rays, CV_32FC4); }
+void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
+  upload(intensities_, view, intensity, CV_32FC1);
+}
+void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
+  upload(hypotheses_, view, hypotheses, CV_32FC4);
+}
+cv::Mat VulkanBackend::hypotheses(int view) { return download(hypotheses_, view); }
+cv::Mat VulkanBackend::checks(int view) { return download(checks_, view); }
+
+std::size_t VulkanBackend::device_bytes() const {
+  VkDeviceSize bytes = 0;
+  for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
+    bytes += image->bytes;
+  }
+  for (const Buffer* buffer : {&parameters_, &transfer_nearest_, &transfer_winner_, &staging_}) {
+    bytes += buffer->bytes;
+  }
+  return static_cast<std::size_t>(bytes);
+}
+
+void VulkanBackend::require_constants(const Schedule& schedule) const {
+  if (schedule.constants == constants_) return;
+  throw Error(
+      "The schedule was made for other kernel constants than this matcher; make a new one.");
+}
+
+void VulkanBackend::record_parameters(VkCommandBuffer commands, const Schedule& schedule) const {
+  barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+  context_.vk().vkCmdUpdateBuffer(commands, parameters_.handle.get(), 0, sizeof schedule.parameters,
+                                  &schedule.parameters);
+}
+
+void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) const {
+  const DeviceFunctions& vk = context_.vk();
+  // Bands of one dispatch would need none, but synchronization validation sees whole images only,
+  // and draining the device costs nothing beside a band.
+  barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+          VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT);
+  vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE,
+                       pipelines_.get(band.dispatch->kernel));
+  vk.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.layout(), 0, 1,
+                             &descriptor_set_, 0, nullptr);
+  kernel::PassParameters pass = band.dispatch->pass;
+  pass.first_row = band.first_row;
+  pass.last_row = band.last_row;
+  vk.vkCmdPushConstants(commands, pipelines_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof pass,
+                        &pass);
+  const int width = band.dispatch->width;
+  const int columns = pass.colour < 0 ? width : (width + 1) / 2;
+  vk.vkCmdDispatch(commands, workgroups(columns), workgroups(band.last_row - band.first_row), 1);
+}
+
+void VulkanBackend::record(VkCommandBuffer commands, const Schedule& schedule) const {
+  require_constants(schedule);
+  record_parameters(commands, schedule);
+  for (const Band& band : split_into_bands(schedule, max_samples_)) record_band(commands, band);
+}
+
+/// Feeds the two submissions in turn and accounts for what they have finished.
+struct VulkanBackend::Run {
+  /// Consecutive bands of one kernel: what lies between two timestamps.
+  struct Stretch {
+    Kernel kernel = Kernel::initialise;
+    int dispatches = 0;
+  };
+  struct InFlight {
+    std::vector<Stretch> stretches;
+    long long samples = 0;
+  };
+
+  void submit(std::span<const Band> bands, bool first) {
+    Submission& submission = *backend.submissions_[turn];
+    InFlight& work = in_flight[turn];
+    work = {};
+    const VkCommandBuffer commands = submission.begin();
+    if (first) backend.record_parameters(commands, schedule);
+    submission.write_timestamp();
+    for (std::size_t i = 0; i < bands.size(); ++i) {
+      const Band& band = bands[i];
+      const Kernel kernel = band.dispatch->kernel;
+      if (work.stretches.empty()) {
+        work.stretches.push_back({kernel, 0});
+      } else if (work.stretches.back().kernel != kernel) {
+        submission.write_timestamp();
+        work.stretches.push_back({kernel, 0});
+      }
+      if (band.first_row == 0) ++work.stretches.back().dispatches;
+      work.samples += band.samples;
+      backend.record_band(commands, band);
+    }
+    submission.write_timestamp();
+    submission.submit();
+    turn = 1 - turn;
+  }
+
+  /// Waits for the older submission.
+  void finish() {
+    Submission& submission = *backend.submissions_[turn];
+    if (!submission.in_flight()) return;
+    submission.wait();
+    const InFlight& work = in_flight[turn];
+    const std::vector<double> elapsed = submission.elapsed();
+    for (std::size_t i = 0; i < work.stretches.size(); ++i) {
+      backend.times_.add(work.stretches[i].kernel, work.stretches[i].dispatches,
+                         i < elapsed.size() ? elapsed[i] : 0);
+    }
+    progress.advance(work.samples);
+  }
+
+  VulkanBackend& backend;
+  const Schedule& schedule;
+  ScheduleProgress progress;
+  std::array<InFlight, 2> in_flight{};
+  std::size_t turn = 0;
+};
+
+void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
+  require_constants(schedule);
+  // Left in flight by a run that ended in an exception.
+  for (auto& submission : submissions_) submission->wait();
+  times_.clear();
+  const std::vector<Band> bands = split_into_bands(schedule, max_samples_);
+  Run run{*this, schedule, ScheduleProgress(schedule, progress)};
+  bool first = true;
+  for (const auto group : group_for_submission(bands, max_samples_, max_bands_per_submission)) {
+    run.finish();
+    run.submit(group, first);
+    first = false;
+  }
+  run.finish();
+  run.turn = 1 - run.turn;
+  run.finish();
+}
+
+}  // namespace widestereo

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "matching/backend.h"
+#include "vulkan/bands.h"
+#include "vulkan/memory.h"
+#include "vulkan/pipeline_cache.h"
+#include "vulkan/pipelines.h"
+#include "vulkan/submission.h"
+
+namespace widestereo {
+
+/// Images and kernels for matches of fixed sizes on a Vulkan device. Not thread-safe; the context
+/// must outlive it. Everything but record() and record_bands() submits to the context's queue and
+/// waits for its own fence.
+class VulkanBackend final : public Backend {
+ public:
+  /// `max_samples`: longest dispatch and submission in patch samples, 0 = by device type. The
+  /// result does not depend on it.
+  VulkanBackend(const VulkanContext& context, const std::vector<cv::Size>& sizes,
+                const KernelConstants& constants, PipelineCache& cache, long long max_samples = 0);
+  ~VulkanBackend() override;
+
+  /// Records a whole schedule into a command buffer of the caller's, which the caller submits to a
+  /// queue of the context's family; submits nothing and waits for nothing. The commands wait for
+  /// earlier compute and transfer commands of the queue; a caller that reads the results puts a
+  /// barrier after them (from compute shader writes; all images are in VK_IMAGE_LAYOUT_GENERAL).
+  void record(VkCommandBuffer commands, const Schedule& schedule) const;
+
+  void set_rays(int view, const cv::Mat& rays) override;
+  void set_intensity(int view, const cv::Mat& intensity) override;
+  void run(const Schedule& schedule, const Matcher::Progress& progress) override;
+  cv::Mat hypotheses(int view) override;
+  void set_hypotheses(int view, const cv::Mat& hypotheses) override;
+  cv::Mat checks(int view) override;
+  std::vector<KernelTime> times() const override { return times_.list(); }
+  std::size_t device_bytes() const override;
+
+ private:
+  struct Run;  // of run(): what is in flight
+
+  void make_images(const VulkanContext& context);
+  void make_descriptor_set();
+  void clear_images();
+  void require_constants(const Schedule& schedule) const;
+  void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
+  void record_band(VkCommandBuffer commands, const Band& band) const;
+  void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
+  void upload(const LayeredImage& image, int view, const cv::Mat& map, int type);
+  cv::Mat download(const LayeredImage& image, int view);
+
+  const VulkanContext& context_;
+  std::vector<cv::Size> sizes_;
+  KernelConstants constants_;
+  long long max_samples_;
+  Pipelines pipelines_;
+  LayeredImage intensities_;
+  LayeredImage rays_;
+  LayeredImage hypotheses_;
+  LayeredImage checks_;
+  Buffer parameters_;
+  Buffer transfer_nearest_;
+  Buffer transfer_winner_;
+  Buffer staging_;
+  Handle<VkSampler> sampler_;
+  Handle<VkDescriptorPool> descriptor_pool_;
+  VkDescriptorSet descriptor_set_ = VK_NULL_HANDLE;
+  Handle<VkCommandPool> command_pool_;
+  std::array<std::unique_ptr<Submission>, 2> submissions_;  // one is recorded while the other runs
+  KernelTimes times_;
+};
+
+}  // namespace widestereo
