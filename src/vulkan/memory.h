@@ -16,11 +16,13 @@ struct Buffer {
   void* mapped = nullptr;
 };
 
-/// A 2D array image (one layer for each view) with memory of its own and a view of all layers.
+/// A 2D array image (one layer for each view) with memory of its own and a view of all layers. It
+/// is in layout `layout` whenever nothing is being copied.
 struct LayeredImage {
   Handle<VkDeviceMemory> memory;
   Handle<VkImage> handle;
   Handle<VkImageView> view;
+  VkImageLayout layout = VK_IMAGE_LAYOUT_GENERAL;
   VkDeviceSize bytes = 0;
 };
 

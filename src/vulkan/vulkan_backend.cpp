@@ -13,6 +13,8 @@ namespace {
 constexpr VkFormat map_format = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
 constexpr std::size_t max_bands_per_submission = 256;
+constexpr VkPipelineStageFlags compute_and_transfer =
+    VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
 constexpr std::uint32_t workgroup = 8;  // of shaders/bindings.glsl, both ways
 
 /// About 100 ms of a slow device of each kind.
@@ -51,6 +53,11 @@ VkBufferImageCopy whole_layer(int layer, cv::Size size) {
   region.imageExtent = {static_cast<std::uint32_t>(size.width),
                         static_cast<std::uint32_t>(size.height), 1};
   return region;
+}
+
+VkImageSubresourceRange layers_of(int first, std::size_t count) {
+  return {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, static_cast<std::uint32_t>(first),
+          static_cast<std::uint32_t>(count)};
 }
 
 std::uint32_t workgroups(int threads) {
@@ -174,7 +181,7 @@ void VulkanBackend::make_descriptor_set() {
     one.pBufferInfo = buffer;
   };
   const auto image_info = [&](const LayeredImage& image, VkSampler sampler) {
-    return VkDescriptorImageInfo{sampler, image.view.get(), VK_IMAGE_LAYOUT_GENERAL};
+    return VkDescriptorImageInfo{sampler, image.view.get(), image.layout};
   };
   const auto buffer_info = [](const Buffer& buffer) {
     return VkDescriptorBufferInfo{buffer.handle.get(), 0, VK_WHOLE_SIZE};
@@ -197,31 +204,37 @@ void VulkanBackend::make_descriptor_set() {
                             writes.data(), 0, nullptr);
 }
 
-// All images stay in the general layout for good, so that memory barriers are all that is ever
-// needed.
 void VulkanBackend::clear_images() {
-  const DeviceFunctions& vk = context_.vk();
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange all = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0,
-                                       VK_REMAINING_ARRAY_LAYERS};
+  const VkImageSubresourceRange all = layers_of(0, sizes_.size());
+  const VkClearColorValue zero{};
   for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
-    VkImageMemoryBarrier to_general{};
-    to_general.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
-    to_general.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-    to_general.oldLayout = VK_IMAGE_LAYOUT_UNDEFINED;
-    to_general.newLayout = VK_IMAGE_LAYOUT_GENERAL;
-    to_general.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    to_general.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
-    to_general.image = image->handle.get();
-    to_general.subresourceRange = all;
-    vk.vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TOP_OF_PIPE_BIT,
-                            VK_PIPELINE_STAGE_TRANSFER_BIT, 0, 0, nullptr, 0, nullptr, 1,
-                            &to_general);
-    const VkClearColorValue zero{};
-    vk.vkCmdClearColorImage(commands, image->handle.get(), VK_IMAGE_LAYOUT_GENERAL, &zero, 1, &all);
+    transition(commands, *image, all, VK_IMAGE_LAYOUT_UNDEFINED,
+               VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+    context_.vk().vkCmdClearColorImage(commands, image->handle.get(),
+                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &zero, 1, &all);
+    transition(commands, *image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, image->layout);
   }
   submissions_[0]->submit();
   submissions_[0]->wait();
+}
+
+void VulkanBackend::transition(VkCommandBuffer commands, const LayeredImage& image,
+                               const VkImageSubresourceRange& layers, VkImageLayout from,
+                               VkImageLayout to) const {
+  VkImageMemoryBarrier info{};
+  info.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
+  info.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  info.dstAccessMask = VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT |
+                       VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  info.oldLayout = from;
+  info.newLayout = to;
+  info.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  info.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+  info.image = image.handle.get();
+  info.subresourceRange = layers;
+  context_.vk().vkCmdPipelineBarrier(commands, compute_and_transfer, compute_and_transfer, 0, 0,
+                                     nullptr, 0, nullptr, 1, &info);
 }
 
 void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stages,
@@ -230,9 +243,8 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stage
   memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
   memory.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
   memory.dstAccessMask = access;
-  context_.vk().vkCmdPipelineBarrier(
-      commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT, stages, 0, 1,
-      &memory, 0, nullptr, 0, nullptr);
+  context_.vk().vkCmdPipelineBarrier(commands, compute_and_transfer, stages, 0, 1, &memory, 0,
+                                     nullptr, 0, nullptr);
 }
 
 void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map, int type) {
@@ -245,11 +257,12 @@ void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& m
   }
   map.copyTo(cv::Mat(size, type, staging_.mapped));
   const VkCommandBuffer commands = submissions_[0]->begin();
-  barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
-          VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT);
+  const VkImageSubresourceRange layer = layers_of(view, 1);
   const VkBufferImageCopy region = whole_layer(view, size);
+  transition(commands, image, layer, image.layout, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
-                                       VK_IMAGE_LAYOUT_GENERAL, 1, &region);
+                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
+  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, image.layout);
   submissions_[0]->submit();
   submissions_[0]->wait();
 }
@@ -257,11 +270,13 @@ void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& m
 cv::Mat VulkanBackend::download(const LayeredImage& image, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   const VkCommandBuffer commands = submissions_[0]->begin();
-  barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT,
-          VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT);
+  const VkImageSubresourceRange layer = layers_of(view, 1);
   const VkBufferImageCopy region = whole_layer(view, size);
-  context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(), VK_IMAGE_LAYOUT_GENERAL,
-                                       staging_.handle.get(), 1, &region);
+  transition(commands, image, layer, image.layout, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+  context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(),
+                                       VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging_.handle.get(),
+                                       1, &region);
+  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, image.layout);
   barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();

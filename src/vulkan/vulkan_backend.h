@@ -47,6 +47,9 @@ class VulkanBackend final : public Backend {
   void make_images(const VulkanContext& context);
   void make_descriptor_set();
   void clear_images();
+  void transition(VkCommandBuffer commands, const LayeredImage& image,
+                  const VkImageSubresourceRange& layers, VkImageLayout from,
+                  VkImageLayout to) const;
   void require_constants(const Schedule& schedule) const;
   void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
