@@ -129,9 +129,6 @@ LayeredImage make_image(const VulkanContext& context, VkFormat format, cv::Size 
   context.check(vk.vkCreateImage(context.device(), &info, nullptr, &image), "make " + purpose);
   LayeredImage result;
   result.handle = context.own(image, vk.vkDestroyImage);
-  result.layout = (usage & VK_IMAGE_USAGE_STORAGE_BIT) != 0
-                      ? VK_IMAGE_LAYOUT_GENERAL
-                      : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;
 
   VkMemoryRequirements requirements{};
   vk.vkGetImageMemoryRequirements(context.device(), image, &requirements);

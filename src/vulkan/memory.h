@@ -22,7 +22,6 @@ struct LayeredImage {
   Handle<VkDeviceMemory> memory;
   Handle<VkImage> handle;
   Handle<VkImageView> view;
-  VkImageLayout layout = VK_IMAGE_LAYOUT_GENERAL;
   VkDeviceSize bytes = 0;
 };
 

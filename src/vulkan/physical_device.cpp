@@ -117,8 +117,9 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
     return "it lacks storage images of four 32-bit floats; use another device.";
   }
   if (!has_format(vk, device, VK_FORMAT_R32_SFLOAT,
-                  VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
-    return "it lacks sampled images of 32-bit floats; use another device.";
+                  VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT |
+                      VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
+    return "it lacks sampled and storage images of 32-bit floats; use another device.";
   }
   if (limits.maxPushConstantsSize < sizeof(kernel::PassParameters)) {
     return too_low("maxPushConstantsSize", sizeof(kernel::PassParameters),
@@ -131,8 +132,8 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   if (limits.maxComputeWorkGroupInvocations < 64) {
     return too_low("maxComputeWorkGroupInvocations", 64, limits.maxComputeWorkGroupInvocations);
   }
-  if (limits.maxPerStageDescriptorStorageImages < 3) {
-    return too_low("maxPerStageDescriptorStorageImages", 3,
+  if (limits.maxPerStageDescriptorStorageImages < 4) {
+    return too_low("maxPerStageDescriptorStorageImages", 4,
                    limits.maxPerStageDescriptorStorageImages);
   }
   return "";

@@ -9,12 +9,17 @@
 namespace widestereo {
 namespace {
 
-/// In the order of their constant_id.
-constexpr std::array<VkSpecializationMapEntry, 4> specialisation_entries = {{
-    {0, offsetof(KernelConstants, window_radius), sizeof(int)},
-    {1, offsetof(KernelConstants, warp), sizeof(int)},
-    {2, offsetof(KernelConstants, source_model), sizeof(int)},
-    {3, offsetof(KernelConstants, view_count), sizeof(int)},
+struct Specialisation {
+  KernelConstants constants;
+  VkBool32 sampled = VK_TRUE;
+};
+
+constexpr std::array<VkSpecializationMapEntry, 5> specialisation_entries = {{
+    {0, offsetof(Specialisation, constants.window_radius), sizeof(int)},
+    {1, offsetof(Specialisation, constants.warp), sizeof(int)},
+    {2, offsetof(Specialisation, constants.source_model), sizeof(int)},
+    {3, offsetof(Specialisation, constants.view_count), sizeof(int)},
+    {4, offsetof(Specialisation, sampled), sizeof(VkBool32)},
 }};
 
 Handle<VkShaderModule> make_module(const VulkanContext& context, const std::string& name) {
@@ -30,7 +35,7 @@ Handle<VkShaderModule> make_module(const VulkanContext& context, const std::stri
 }
 
 Handle<VkPipeline> make_pipeline(const VulkanContext& context, const std::string& name,
-                                 const KernelConstants& constants, VkPipelineLayout layout,
+                                 const Specialisation& constants, VkPipelineLayout layout,
                                  VkPipelineCache cache) {
   const Handle<VkShaderModule> module = make_module(context, name);
   const VkSpecializationInfo specialisation = {
@@ -53,14 +58,15 @@ Handle<VkPipeline> make_pipeline(const VulkanContext& context, const std::string
 
 }  // namespace
 
-Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants,
+Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
                      VkPipelineCache cache) {
   make_layouts(context);
+  const Specialisation specialisation = {constants, sampled ? VK_TRUE : VK_FALSE};
   for (int i = 0; i < kernel_count; ++i) {
     const Kernel kernel = static_cast<Kernel>(i);
     if (kernel == Kernel::iterate_raster) continue;
     pipelines_[static_cast<std::size_t>(i)] =
-        make_pipeline(context, to_string(kernel), constants, layout(), cache);
+        make_pipeline(context, to_string(kernel), specialisation, layout(), cache);
   }
 }
 
@@ -70,7 +76,8 @@ void Pipelines::make_layouts(const VulkanContext& context) {
   };
   const std::array bindings = {
       binding(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
-      binding(binding_intensities, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
+      binding(binding_intensity_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
+      binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_checks, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),

@@ -11,19 +11,22 @@ namespace widestereo {
 /// Bindings of shaders/bindings.glsl.
 enum Binding : std::uint32_t {
   binding_parameters = 0,
-  binding_intensities = 1,
-  binding_rays = 2,
-  binding_hypotheses = 3,
-  binding_checks = 4,
-  binding_nearest = 5,
-  binding_winner = 6,
+  binding_intensity_texture = 1,
+  binding_intensities = 2,
+  binding_rays = 3,
+  binding_hypotheses = 4,
+  binding_checks = 5,
+  binding_nearest = 6,
+  binding_winner = 7,
 };
 
 /// One compute pipeline for each kernel (iterate_raster, which is sequential, excepted),
 /// specialised for constants; all share one descriptor set layout.
 class Pipelines {
  public:
-  Pipelines(const VulkanContext& context, const KernelConstants& constants, VkPipelineCache cache);
+  /// `sampled`: intensities are read through the texture units instead of as storage images.
+  Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
+            VkPipelineCache cache);
 
   VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
   VkPipelineLayout layout() const { return layout_.get(); }

@@ -30,6 +30,10 @@ long long default_max_samples(VkPhysicalDeviceType type) {
   }
 }
 
+bool runs_on_cpu(const VulkanContext& context) {
+  return context.properties().deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+}
+
 cv::Size largest(const std::vector<cv::Size>& sizes) {
   cv::Size size;
   for (const cv::Size& one : sizes) {
@@ -94,13 +98,13 @@ Handle<VkCommandPool> make_command_pool(const VulkanContext& context) {
 
 VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv::Size>& sizes,
                              const KernelConstants& constants, PipelineCache& cache,
-                             long long max_samples)
+                             const VulkanTuning& tuning)
     : context_(context),
       sizes_(sizes),
       constants_(constants),
-      max_samples_(max_samples > 0 ? max_samples
-                                   : default_max_samples(context.properties().deviceType)),
-      pipelines_(context, constants, cache.get()),
+      max_samples_(tuning.max_samples > 0 ? tuning.max_samples
+                                          : default_max_samples(context.properties().deviceType)),
+      pipelines_(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)), cache.get()),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
       sampler_(make_sampler(context)),
       command_pool_(make_command_pool(context)) {
@@ -125,9 +129,10 @@ void VulkanBackend::make_images(const VulkanContext& context) {
                           VK_IMAGE_USAGE_TRANSFER_DST_BIT,
                       purpose);
   };
-  intensities_ =
-      make_image(context, intensity_format, size, layers,
-                 VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT, "the images");
+  intensities_ = make_image(
+      context, intensity_format, size, layers,
+      VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
+      "the images");
   rays_ = make_map("the viewing rays");
   hypotheses_ = make_map("the planes");
   checks_ = make_map("the consistency maps");
@@ -146,7 +151,7 @@ void VulkanBackend::make_descriptor_set() {
   const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1},
       {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1},
-      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 3},
+      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4},
       {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2},
   }};
   VkDescriptorPoolCreateInfo pool_info{};
@@ -181,7 +186,7 @@ void VulkanBackend::make_descriptor_set() {
     one.pBufferInfo = buffer;
   };
   const auto image_info = [&](const LayeredImage& image, VkSampler sampler) {
-    return VkDescriptorImageInfo{sampler, image.view.get(), image.layout};
+    return VkDescriptorImageInfo{sampler, image.view.get(), VK_IMAGE_LAYOUT_GENERAL};
   };
   const auto buffer_info = [](const Buffer& buffer) {
     return VkDescriptorBufferInfo{buffer.handle.get(), 0, VK_WHOLE_SIZE};
@@ -194,7 +199,9 @@ void VulkanBackend::make_descriptor_set() {
   const VkDescriptorBufferInfo nearest = buffer_info(transfer_nearest_);
   const VkDescriptorBufferInfo winner = buffer_info(transfer_winner_);
   write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
-  write(binding_intensities, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &intensities, nullptr);
+  write(binding_intensity_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &intensities,
+        nullptr);
+  write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &intensities, nullptr);
   write(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &rays, nullptr);
   write(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &hypotheses, nullptr);
   write(binding_checks, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &checks, nullptr);
@@ -213,7 +220,8 @@ void VulkanBackend::clear_images() {
                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
     context_.vk().vkCmdClearColorImage(commands, image->handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &zero, 1, &all);
-    transition(commands, *image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, image->layout);
+    transition(commands, *image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+               VK_IMAGE_LAYOUT_GENERAL);
   }
   submissions_[0]->submit();
   submissions_[0]->wait();
@@ -259,10 +267,10 @@ void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& m
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layers_of(view, 1);
   const VkBufferImageCopy region = whole_layer(view, size);
-  transition(commands, image, layer, image.layout, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+  transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
-  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, image.layout);
+  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
   submissions_[0]->submit();
   submissions_[0]->wait();
 }
@@ -272,11 +280,11 @@ cv::Mat VulkanBackend::download(const LayeredImage& image, int view) {
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layers_of(view, 1);
   const VkBufferImageCopy region = whole_layer(view, size);
-  transition(commands, image, layer, image.layout, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+  transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
   context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging_.handle.get(),
                                        1, &region);
-  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, image.layout);
+  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
   barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,15 +16,23 @@
 
 namespace widestereo {
 
+/// What suits a device; the result does not depend on it.
+struct VulkanTuning {
+  /// Longest dispatch and submission in patch samples, 0 = by device type.
+  long long max_samples = 0;
+  /// Reads intensities through the texture units; unset: everywhere but on CPUs.
+  std::optional<bool> sampled = std::nullopt;
+};
+
 /// Images and kernels for matches of fixed sizes on a Vulkan device. Not thread-safe; the context
-/// must outlive it. Everything but record() and record_bands() submits to the context's queue and
-/// waits for its own fence.
+/// must outlive it. Everything but record() submits to the context's queue and waits for its own
+/// fence.
 class VulkanBackend final : public Backend {
  public:
-  /// `max_samples`: longest dispatch and submission in patch samples, 0 = by device type. The
-  /// result does not depend on it.
+  /// Throws Error naming the device and the memory, limit or feature that it lacks.
   VulkanBackend(const VulkanContext& context, const std::vector<cv::Size>& sizes,
-                const KernelConstants& constants, PipelineCache& cache, long long max_samples = 0);
+                const KernelConstants& constants, PipelineCache& cache,
+                const VulkanTuning& tuning = {});
   ~VulkanBackend() override;
 
   /// Records a whole schedule into a command buffer of the caller's, which the caller submits to a

@@ -37,7 +37,8 @@ class VulkanDevice final : public Device::Implementation {
 
   std::unique_ptr<Backend> make_backend(const std::vector<cv::Size>& sizes,
                                         const KernelConstants& constants) override {
-    return std::make_unique<VulkanBackend>(context_, sizes, constants, cache_, max_samples_);
+    return std::make_unique<VulkanBackend>(context_, sizes, constants, cache_,
+                                           VulkanTuning{.max_samples = max_samples_});
   }
 
   std::vector<std::string> validation_messages() const override {
