@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/camera.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "geometry/camera_parameters.h"
+#include "geometry/dual.h"
+#include "widestereo/error.h"
+
+namespace widestereo::kernel::dual {
+using real = geometry::Dual;
+using real2 = Vector2<real>;
+using real3 = Vector3<real>;
+using real4 = Vector4<real>;
+using geometry::atan;
+using geometry::sqrt;
+#include "camera.glsl"
+}  // namespace widestereo::kernel::dual
+
+namespace widestereo {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using geometry::Dual;
+
+/// Largest error of a ray, in pixels, before it counts as not found.
+constexpr double unprojection_tolerance = 1e-6;
+
+bool project_with(const kernel::precise::CameraParameters& parameters, const Vector3d& point,
+                  Vector2d& pixel) {
+  kernel::precise::real2 u{};
+  const bool inside = kernel::precise::project(
+      parameters, parameters.size.z, kernel::precise::real3(point.x(), point.y(), point.z()), u);
+  pixel = {u.x, u.y};
+  return inside && pixel.allFinite();
+}
+
+kernel::dual::real4 constant(const kernel::precise::real4& v) {
+  return {Dual(v.x), Dual(v.y), Dual(v.z), Dual(v.w)};
+}
+
+kernel::dual::CameraParameters constant(const kernel::precise::CameraParameters& p) {
+  return {constant(p.intrinsics), constant(p.shape), constant(p.distortion), constant(p.domain),
+          p.size};
+}
+
+/// Root of an increasing function on [low, high]: Newton, falling back to bisection.
+template <class Function>
+double increasing_root(Function value_and_slope, double low, double high, double start) {
+  double x = std::clamp(start, low, high);
+  for (int i = 0; i < 100; ++i) {
+    const auto [value, slope] = value_and_slope(x);
+    (value > 0 ? high : low) = x;
+    double next = x - value / slope;
+    if (!(next > low && next < high)) next = 0.5 * (low + high);
+    if (std::abs(next - x) <= 1e-16 * (1 + std::abs(x))) return next;
+    x = next;
+  }
+  return x;
+}
+
+/// theta with theta (1 + k1 theta^2 + ...) = r, or a negative number beyond the model's limit.
+double kannala_brandt_theta(const kernel::precise::CameraParameters& p, double r) {
+  const std::array<double, 4> k = {p.shape.x, p.shape.y, p.shape.z, p.shape.w};
+  const auto value_and_slope = [&](double theta) {
+    const double t = theta * theta;
+    const double value = theta * (1 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3])))) - r;
+    const double slope = 1 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])));
+    return std::pair(value, slope);
+  };
+  const double limit = p.domain.y;
+  if (value_and_slope(limit).first < 0) return -1;
+  return increasing_root(value_and_slope, 0, limit, r);
+}
+
+/// The undistorted point whose Brown-Conrady distortion is m; false outside the increasing part.
+bool undistort(const kernel::precise::CameraParameters& p, const Vector2d& m,
+               Vector2d& undistorted) {
+  // The radial part alone brackets the radius; Newton in two dimensions adds the tangential part.
+  const double k1 = p.distortion.x;
+  const double k2 = p.distortion.y;
+  const double k3 = p.domain.w;
+  const double norm = m.norm();
+  const auto value_and_slope = [&](double r) {
+    const double q = r * r;
+    return std::pair(r * (1 + q * (k1 + q * (k2 + q * k3))) - norm,
+                     1 + q * (3 * k1 + q * (5 * k2 + q * 7 * k3)));
+  };
+  const double largest = std::sqrt(p.domain.y);
+  double high = std::min(largest, std::max(1.0, 2 * norm));
+  while (high < largest && value_and_slope(high).first < 0) high = std::min(largest, 2 * high);
+  const double radius = increasing_root(value_and_slope, 0, high, norm);
+  undistorted = norm > 0 ? Vector2d(m * (radius / norm)) : Vector2d::Zero();
+
+  const kernel::dual::CameraParameters dual = constant(p);
+  for (int i = 0; i < 30; ++i) {
+    const Dual x(undistorted.x(), Eigen::RowVector3d::UnitX());
+    const Dual y(undistorted.y(), Eigen::RowVector3d::UnitY());
+    const kernel::dual::real2 d = kernel::dual::distort(dual, x, y, x * x + y * y);
+    Eigen::Matrix2d jacobian;
+    jacobian << d.x.derivative.head<2>(), d.y.derivative.head<2>();
+    const Vector2d step = jacobian.inverse() * (m - Vector2d(d.x.value, d.y.value));
+    if (!step.allFinite()) return false;
+    undistorted += step;
+    if (step.norm() <= 1e-15 * (1 + undistorted.norm())) break;
+  }
+  return undistorted.squaredNorm() < p.domain.y;
+}
+
+/// Direction (any length) of a point on the model's normalised plane, before checking the domain.
+bool direction_of(const Camera& c, const kernel::precise::CameraParameters& p, Vector2d m,
+                  Vector3d& direction) {
+  if (c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei) {
+    if (!undistort(p, m, m)) return false;
+  }
+  const double r2 = m.squaredNorm();
+  const double r = std::sqrt(r2);
+  switch (c.model) {
+    case CameraModel::pinhole:
+    case CameraModel::pinhole_radtan:
+      direction = m.homogeneous();
+      return true;
+    case CameraModel::kannala_brandt: {
+      const double theta = kannala_brandt_theta(p, r);
+      if (theta < 0) return false;
+      direction << (r > 0 ? std::sin(theta) / r : 1.0) * m, std::cos(theta);
+      return true;
+    }
+    case CameraModel::double_sphere: {
+      const double a = c.alpha;
+      const double mz = (1 - a * a * r2) / (a * std::sqrt(1 - (2 * a - 1) * r2) + 1 - a);
+      const double scale =
+          (mz * c.xi + std::sqrt(mz * mz + (1 - c.xi * c.xi) * r2)) / (mz * mz + r2);
+      direction << scale * m, scale * mz - c.xi;
+      return true;
+    }
+    case CameraModel::unified:
+    case CameraModel::mei: {
+      const double scale = (c.xi + std::sqrt(1 + (1 - c.xi * c.xi) * r2)) / (1 + r2);
+      direction << scale * m, scale - c.xi;
+      return true;
+    }
+    case CameraModel::extended_unified: {
+      const double a = c.alpha;
+      const double b = c.beta;
+      direction << m, (1 - b * a * a * r2) / (a * std::sqrt(1 - (2 * a - 1) * b * r2) + 1 - a);
+      return true;
+    }
+    case CameraModel::field_of_view: {
+      const double angle = r * c.omega;
+      if (angle >= std::numbers::pi) return false;
+      direction << (r > 0 ? std::sin(angle) / r : c.omega) * m,
+          2 * std::tan(c.omega / 2) * std::cos(angle);
+      return true;
+    }
+  }
+  return false;
+}
+
+bool unproject_with(const Camera& c, const kernel::precise::CameraParameters& p,
+                    const Vector2d& pixel, Vector3d& ray) {
+  Vector2d m;
+  m.y() = (pixel.y() - c.cy) / c.fy;
+  m.x() = (pixel.x() - c.cx - c.skew * m.y()) / c.fx;
+  if (!direction_of(c, p, m, ray)) return false;
+  ray.normalize();
+  // Projecting back checks the domain and the field of view and catches every way of not
+  // converging.
+  Vector2d again;
+  return ray.allFinite() && project_with(p, ray, again) &&
+         (again - pixel).norm() <= unprojection_tolerance * (1 + pixel.norm() / 1000);
+}
+
+}  // namespace
+
+std::string to_string(CameraModel model) {
+  static const std::array<const char*, 8> names = {
+      "pinhole", "pinhole_radtan",   "kannala_brandt", "double_sphere",
+      "unified", "extended_unified", "field_of_view",  "mei"};
+  return names.at(static_cast<std::size_t>(model));
+}
+
+bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel) {
+  return project_with(camera_parameters(camera), point, pixel);
+}
+
+bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel,
+             Eigen::Matrix<double, 2, 3>& jacobian) {
+  const kernel::dual::CameraParameters parameters = constant(camera_parameters(camera));
+  const kernel::dual::real3 variable(Dual(point.x(), Eigen::RowVector3d::UnitX()),
+                                     Dual(point.y(), Eigen::RowVector3d::UnitY()),
+                                     Dual(point.z(), Eigen::RowVector3d::UnitZ()));
+  kernel::dual::real2 u{};
+  const bool inside = kernel::dual::project(parameters, parameters.size.z, variable, u);
+  pixel = {u.x.value, u.y.value};
+  jacobian << u.x.derivative, u.y.derivative;
+  return inside && pixel.allFinite();
+}
+
+bool unproject(const Camera& camera, const Vector2d& pixel, Vector3d& ray) {
+  return unproject_with(camera, camera_parameters(camera), pixel, ray);
+}
+
+double model_max_theta(const Camera& camera) {
+  Camera unlimited_view = camera;
+  unlimited_view.max_theta = std::numbers::pi;
+  const kernel::precise::CameraParameters parameters = camera_parameters(unlimited_view);
+  double inside = 0;
+  double outside = std::numbers::pi;
+  for (int i = 0; i < 60; ++i) {
+    const double theta = 0.5 * (inside + outside);
+    Vector2d pixel;
+    const bool seen = project_with(parameters, {std::sin(theta), 0, std::cos(theta)}, pixel);
+    (seen ? inside : outside) = theta;
+  }
+  return inside;
+}
+
+Camera resized(const Camera& camera, int width, int height) {
+  const double sx = static_cast<double>(width) / camera.width;
+  const double sy = static_cast<double>(height) / camera.height;
+  Camera result = camera;
+  result.width = width;
+  result.height = height;
+  result.fx *= sx;
+  result.fy *= sy;
+  result.skew *= sx;
+  result.cx = sx * (camera.cx + 0.5) - 0.5;
+  result.cy = sy * (camera.cy + 0.5) - 0.5;
+  return result;
+}
+
+cv::Mat ray_image(const Camera& camera, const cv::Mat& mask) {
+  Camera whole = camera;
+  whole.max_theta = std::numbers::pi;
+  const kernel::precise::CameraParameters model = camera_parameters(whole);
+  const double cosine = camera_parameters(camera).domain.x;
+  cv::Mat rays = cv::Mat::zeros(camera.height, camera.width, CV_32FC4);
+  cv::parallel_for_(cv::Range(0, camera.height), [&](const cv::Range& rows) {
+    for (int y = rows.start; y < rows.end; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        Vector3d ray;
+        if (!unproject_with(whole, model, {x, y}, ray)) continue;
+        const bool usable = ray.z() >= cosine && (mask.empty() || mask.at<uchar>(y, x) != 0);
+        const Eigen::Vector3f single = ray.cast<float>();
+        rays.at<cv::Vec4f>(y, x) = {single.x(), single.y(), single.z(), usable ? 1.0f : 0.0f};
+      }
+    }
+  });
+  return rays;
+}
+
+}  // namespace widestereo

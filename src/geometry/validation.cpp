@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include <Eigen/Dense>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include "widestereo/error.h"
+#include "widestereo/rig.h"
+
+namespace widestereo {
+namespace {
+
+constexpr int largest_side = 16384;
+
+void require(bool good, const std::string& name, const std::string& what, double value,
+             const std::string& remedy) {
+  if (good) return;
+  std::ostringstream text;
+  text << name << ": " << what << " is " << value << "; " << remedy << ".";
+  throw Error(text.str());
+}
+
+void require_finite(const Camera& c, const std::string& name) {
+  const std::array<std::pair<const char*, double>, 16> values = {{{"fx", c.fx},
+                                                                  {"fy", c.fy},
+                                                                  {"cx", c.cx},
+                                                                  {"cy", c.cy},
+                                                                  {"skew", c.skew},
+                                                                  {"xi", c.xi},
+                                                                  {"alpha", c.alpha},
+                                                                  {"beta", c.beta},
+                                                                  {"omega", c.omega},
+                                                                  {"k1", c.k1},
+                                                                  {"k2", c.k2},
+                                                                  {"k3", c.k3},
+                                                                  {"k4", c.k4},
+                                                                  {"p1", c.p1},
+                                                                  {"p2", c.p2},
+                                                                  {"max_theta", c.max_theta}}};
+  for (const auto& [what, value] : values) {
+    // Far beyond any calibration, yet safe to square in single precision.
+    require(std::isfinite(value) && std::abs(value) < 1e9, name, what, value,
+            "it must be a finite number of ordinary size");
+  }
+}
+
+}  // namespace
+
+void validate(const Camera& c, const std::string& name) {
+  require(c.width >= 2 && c.width <= largest_side, name, "the image width", c.width,
+          "it must be 2 to 16384 pixels");
+  require(c.height >= 2 && c.height <= largest_side, name, "the image height", c.height,
+          "it must be 2 to 16384 pixels");
+  require_finite(c, name);
+  require(c.fx > 0, name, "fx", c.fx, "it must be positive");
+  require(c.fy > 0, name, "fy", c.fy, "it must be positive");
+  require(c.max_theta > 0 && c.max_theta <= std::numbers::pi + 1e-12, name, "max_theta (radians)",
+          c.max_theta, "it must lie in (0, pi]");
+  switch (c.model) {
+    case CameraModel::pinhole:
+    case CameraModel::pinhole_radtan:
+    case CameraModel::kannala_brandt:
+      break;
+    case CameraModel::double_sphere:
+      require(c.xi > -1 && c.xi <= 1, name, "xi", c.xi, "a double sphere needs it in (-1, 1]");
+      require(c.alpha >= 0 && c.alpha <= 1, name, "alpha", c.alpha,
+              "a double sphere needs it in [0, 1]");
+      break;
+    case CameraModel::unified:
+    case CameraModel::mei:
+      require(c.xi >= 0, name, "xi", c.xi, "the unified model needs it to be 0 or more");
+      break;
+    case CameraModel::extended_unified:
+      require(c.alpha >= 0 && c.alpha <= 1, name, "alpha", c.alpha,
+              "the extended unified model needs it in [0, 1]");
+      require(c.beta > 0, name, "beta", c.beta, "the extended unified model needs it positive");
+      break;
+    case CameraModel::field_of_view:
+      require(c.omega > 1e-6 && c.omega < std::numbers::pi, name, "omega (radians)", c.omega,
+              "the field-of-view model needs it in (0, pi)");
+      break;
+    default:
+      throw Error(name + ": the camera model number " + std::to_string(static_cast<int>(c.model)) +
+                  " is unknown.");
+  }
+}
+
+void validate(const Rig& rig, const std::string& name) {
+  if (rig.views.empty()) throw Error(name + " has no cameras.");
+  for (const View& view : rig.views) {
+    const std::string of_view = name + ": " + view.name;
+    validate(view.camera, of_view);
+    const Eigen::Matrix3d r = view.world_from_camera.linear();
+    if (!view.world_from_camera.matrix().allFinite() ||
+        (r.transpose() * r - Eigen::Matrix3d::Identity()).norm() > 1e-4 || r.determinant() < 0) {
+      throw Error(of_view +
+                  ": the pose is not a rigid motion; its rotation must be orthonormal with "
+                  "determinant +1 and all entries finite.");
+    }
+    if (!view.mask.empty() && (view.mask.type() != CV_8UC1 || view.mask.cols != view.camera.width ||
+                               view.mask.rows != view.camera.height)) {
+      throw Error(of_view + ": the mask is " + std::to_string(view.mask.cols) + "x" +
+                  std::to_string(view.mask.rows) + " pixels, but the camera has " +
+                  std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) +
+                  "; use an 8-bit grey mask of that size.");
+    }
+  }
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    for (std::size_t j = i + 1; j < rig.views.size(); ++j) {
+      if (baseline(rig.views[i], rig.views[j]) > 1e-9) continue;
+      throw Error(name + ": " + rig.views[i].name + " and " + rig.views[j].name +
+                  " have the same centre; stereo needs a baseline.");
+    }
+  }
+}
+
+}  // namespace widestereo
