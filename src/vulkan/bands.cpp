@@ -22,7 +22,8 @@ std::vector<Band> split_into_bands(const Schedule& schedule, long long max_work)
   for (const Dispatch& dispatch : schedule.dispatches) {
     const long long work = estimated_work(dispatch, schedule.constants);
     const long long height = dispatch.height;
-    long long rows = std::clamp(max_work / std::max(work / height, 1LL), 1LL, height);
+    const long long work_of_row = (work + height - 1) / height;
+    long long rows = std::clamp(max_work / std::max(work_of_row, 1LL), 1LL, height);
     if (rows > rows_of_workgroup) rows -= rows % rows_of_workgroup;
     for (long long first = 0; first < height; first += rows) {
       const long long last = std::min(first + rows, height);

@@ -33,6 +33,7 @@ class VulkanContext {
   VulkanContext(const VulkanContext&) = delete;
   VulkanContext& operator=(const VulkanContext&) = delete;
 
+  const VulkanHandles& handles() const { return handles_; }
   const DeviceFunctions& vk() const { return functions_; }
   VkDevice device() const { return handles_.device; }
   VkQueue queue() const { return handles_.queue; }

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+#include "vulkan_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+PFN_vkGetInstanceProcAddr real_get() {
+  static const VulkanLoader loader;
+  return loader.get_instance_proc_addr();
+}
+
+// The real functions behind the wrappers, noted when they are asked for.
+PFN_vkGetDeviceProcAddr real_get_device = nullptr;
+PFN_vkAllocateMemory real_allocate = nullptr;
+PFN_vkQueueSubmit real_submit = nullptr;
+PFN_vkWaitForFences real_wait = nullptr;
+PFN_vkGetPhysicalDeviceProperties2 real_properties = nullptr;
+PFN_vkGetPhysicalDeviceQueueFamilyProperties real_queue_families = nullptr;
+PFN_vkGetPhysicalDeviceImageFormatProperties real_image_limits = nullptr;
+
+Faults& faults() { return FaultyLoader::faults(); }
+
+VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice device, const VkMemoryAllocateInfo* info,
+                                        const VkAllocationCallbacks* callbacks,
+                                        VkDeviceMemory* memory) {
+  if (faults().allocations++ == faults().failing_allocation) return VK_ERROR_OUT_OF_DEVICE_MEMORY;
+  return real_allocate(device, info, callbacks, memory);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL submit(VkQueue queue, std::uint32_t count, const VkSubmitInfo* infos,
+                                      VkFence fence) {
+  if (faults().submissions++ == faults().failing_submission) return VK_ERROR_DEVICE_LOST;
+  return real_submit(queue, count, infos, fence);
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice device, std::uint32_t count, const VkFence* fences,
+                                    VkBool32 all, std::uint64_t timeout) {
+  // Truly waits: the device is not lost, so what it uses may not be destroyed yet.
+  const VkResult result = real_wait(device, count, fences, all, timeout);
+  return faults().waits++ == faults().failing_wait ? VK_ERROR_DEVICE_LOST : result;
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL no_layers(std::uint32_t* count, VkLayerProperties*) {
+  *count = 0;
+  return VK_SUCCESS;
+}
+
+VKAPI_ATTR void VKAPI_CALL no_formats(VkPhysicalDevice, VkFormat, VkFormatProperties* properties) {
+  *properties = {};
+}
+
+VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceProperties2* out) {
+  real_properties(device, out);
+  if (faults().old_device) out->properties.apiVersion = VK_API_VERSION_1_0;
+  if (faults().largest_push_constants > 0) {
+    out->properties.limits.maxPushConstantsSize = faults().largest_push_constants;
+  }
+}
+
+VKAPI_ATTR void VKAPI_CALL queue_families(VkPhysicalDevice device, std::uint32_t* count,
+                                          VkQueueFamilyProperties* families) {
+  real_queue_families(device, count, families);
+  for (std::uint32_t i = 0; families != nullptr && i < *count; ++i) {
+    families[i].queueFlags &= ~static_cast<VkQueueFlags>(VK_QUEUE_COMPUTE_BIT);
+  }
+}
+
+VKAPI_ATTR VkResult VKAPI_CALL image_limits(VkPhysicalDevice device, VkFormat format,
+                                            VkImageType type, VkImageTiling tiling,
+                                            VkImageUsageFlags usage, VkImageCreateFlags flags,
+                                            VkImageFormatProperties* limits) {
+  const VkResult result = real_image_limits(device, format, type, tiling, usage, flags, limits);
+  limits->maxExtent.width = std::min(limits->maxExtent.width, faults().largest_image);
+  return result;
+}
+
+template <class Function>
+PFN_vkVoidFunction wrap(PFN_vkVoidFunction real, Function& slot, Function wrapper) {
+  slot = reinterpret_cast<Function>(real);
+  return reinterpret_cast<PFN_vkVoidFunction>(wrapper);
+}
+
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device(VkDevice device, const char* name) {
+  const std::string wanted = name;
+  const PFN_vkVoidFunction real = real_get_device(device, name);
+  if (wanted == faults().missing_function) return nullptr;
+  if (wanted == "vkAllocateMemory") return wrap(real, real_allocate, &allocate);
+  if (wanted == "vkQueueSubmit") return wrap(real, real_submit, &submit);
+  if (wanted == "vkWaitForFences") return wrap(real, real_wait, &wait);
+  return real;
+}
+
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance(VkInstance instance, const char* name) {
+  const std::string wanted = name;
+  const PFN_vkVoidFunction real = real_get()(instance, name);
+  if (wanted == faults().missing_function) return nullptr;
+  if (wanted == "vkGetDeviceProcAddr") return wrap(real, real_get_device, &get_device);
+  if (wanted == "vkEnumerateInstanceLayerProperties" && faults().no_layers) {
+    return reinterpret_cast<PFN_vkVoidFunction>(&no_layers);
+  }
+  if (wanted == "vkGetPhysicalDeviceFormatProperties" && faults().no_formats) {
+    return reinterpret_cast<PFN_vkVoidFunction>(&no_formats);
+  }
+  if (wanted == "vkGetPhysicalDeviceProperties2") {
+    return wrap(real, real_properties, &properties);
+  }
+  if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" && faults().no_compute_queues) {
+    return wrap(real, real_queue_families, &queue_families);
+  }
+  if (wanted == "vkGetPhysicalDeviceImageFormatProperties" && faults().largest_image > 0) {
+    return wrap(real, real_image_limits, &image_limits);
+  }
+  return real;
+}
+
+}  // namespace
+
+Faults& FaultyLoader::faults() {
+  static Faults state;
+  return state;
+}
+
+PFN_vkGetInstanceProcAddr FaultyLoader::get_instance_proc_addr() { return &get_instance; }
+
+}  // namespace widestereo::test

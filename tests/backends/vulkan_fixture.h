@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+// A small match on the first Vulkan device, and a loader that fails on demand.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "kernel/kernel_fixture.h"
+#include "vulkan/loader.h"
+#include "vulkan/vulkan_device.h"
+#include "widestereo/error.h"
+
+namespace widestereo::test {
+
+/// Skips the test where there is no Vulkan device; where WIDESTEREO_REQUIRE_VULKAN is set it fails
+/// instead.
+#define REQUIRE_VULKAN_OR_SKIP()                                                   \
+  do {                                                                             \
+    std::string why_none;                                                          \
+    if (::widestereo::list_vulkan_devices(&why_none).empty()) {                    \
+      if (std::getenv("WIDESTEREO_REQUIRE_VULKAN") != nullptr) FAIL() << why_none; \
+      GTEST_SKIP() << why_none;                                                    \
+    }                                                                              \
+  } while (false)
+
+/// Two views of different sizes, which also are no multiples of a workgroup, through every kernel.
+inline KernelFixture small_match() {
+  Rig rig = fisheye_rig(45);
+  rig.views[1].camera = fisheye_camera(38);
+  Options options;
+  options.min_distance = 0.3;
+  options.max_distance = 10;
+  options.window_radius = 2;
+  options.first_iterations = 2;
+  options.second_iterations = 1;
+  return KernelFixture(std::move(rig), options);
+}
+
+inline std::vector<cv::Size> sizes_of(const Rig& rig) {
+  std::vector<cv::Size> sizes;
+  for (const View& view : rig.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  return sizes;
+}
+
+inline void upload(Backend& backend, KernelFixture& match) {
+  for (int i = 0; i < static_cast<int>(match.rig().views.size()); ++i) {
+    backend.set_rays(i, match.view(i).rays);
+    backend.set_intensity(i, match.view(i).intensities);
+  }
+}
+
+/// All maps of a match in one matrix of a single column, for comparing bits.
+inline cv::Mat download(Backend& backend, const Rig& rig) {
+  cv::Mat all;
+  for (int i = 0; i < static_cast<int>(rig.views.size()); ++i) {
+    for (const cv::Mat& map : {backend.hypotheses(i), backend.checks(i)}) {
+      all.push_back(map.reshape(1, static_cast<int>(map.total()) * 4));
+    }
+  }
+  return all;
+}
+
+inline cv::Mat run(Backend& backend, KernelFixture& match) {
+  upload(backend, match);
+  backend.run(match.schedule(), {});
+  return download(backend, match.rig());
+}
+
+inline cv::Mat run(Device::Implementation& device, KernelFixture& match) {
+  const auto backend = device.make_backend(sizes_of(match.rig()), match.schedule().constants);
+  return run(*backend, match);
+}
+
+inline bool same_bits(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
+         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+}
+
+/// The message of the Error that `action` throws, empty if it throws none.
+template <class Action>
+std::string error_of(Action action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// What the faulty loader does wrong; one at a time, reset by its owner.
+struct Faults {
+  int failing_allocation = -1;  ///< the n-th vkAllocateMemory is out of device memory
+  int failing_submission = -1;  ///< the n-th vkQueueSubmit loses the device
+  int failing_wait = -1;        ///< the n-th vkWaitForFences loses the device
+  bool no_layers = false;
+  bool no_formats = false;
+  bool no_compute_queues = false;
+  bool old_device = false;  ///< Vulkan 1.0
+  std::uint32_t largest_image = 0;
+  std::uint32_t largest_push_constants = 0;
+  std::string missing_function = {};
+  int allocations = 0;
+  int submissions = 0;
+  int waits = 0;
+};
+
+/// A vkGetInstanceProcAddr around the machine's that injects faults(). The Vulkan API passes no
+/// user data to it, so the state is static; tests run one after the other.
+class FaultyLoader {
+ public:
+  static Faults& faults();
+  static PFN_vkGetInstanceProcAddr get_instance_proc_addr();
+  /// Clears the faults at the end of a scope.
+  struct Scope {
+    Scope() { faults() = {}; }
+    ~Scope() { faults() = {}; }
+  };
+};
+
+}  // namespace widestereo::test

@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: MIT
+// What is Vulkan's own: choosing and opening devices, splitting, caches, validation and failures.
+// That it computes the right thing is the business of parity_test.cpp.
+#include <dlfcn.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "vulkan/bands.h"
+#include "vulkan/instance.h"
+#include "vulkan/vulkan_backend.h"
+#include "vulkan_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Keeps lavapipe loaded to the end: LeakSanitizer cannot name the leaks of a driver that is gone.
+[[maybe_unused]] void* const lavapipe = dlopen("libvulkan_lvp.so", RTLD_NOW | RTLD_NODELETE);
+
+DeviceRequest validated(long max_samples_per_dispatch = 0) {
+  DeviceRequest request;
+  request.validation = true;
+  request.max_samples_per_dispatch = max_samples_per_dispatch;
+  return request;
+}
+
+/// Parts of an application that has a device of its own.
+struct Application {
+  explicit Application(bool validation = true)
+      : instance(loader.get_instance_proc_addr(), validation),
+        context(loader.get_instance_proc_addr(), instance.handle(),
+                instance.physical_devices().at(0)),
+        cache(context, {}) {}
+
+  VulkanLoader loader;
+  VulkanInstance instance;
+  VulkanContext context;
+  PipelineCache cache;
+};
+
+TEST(VulkanDevices, AreDescribedCompletely) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const std::vector<DeviceInfo> devices = list_vulkan_devices(nullptr);
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    const DeviceInfo& info = devices[i];
+    EXPECT_EQ(info.kind, DeviceKind::vulkan);
+    EXPECT_EQ(info.id, "vulkan:" + std::to_string(i));
+    EXPECT_FALSE(info.name.empty());
+    EXPECT_FALSE(info.type.empty());
+    EXPECT_FALSE(info.driver.empty());
+    EXPECT_EQ(info.uuid.size(), 32u);
+    EXPECT_EQ(info.uuid.find_first_not_of("0123456789abcdef"), std::string::npos);
+  }
+}
+
+TEST(VulkanDevices, NoDriverIsOneSentence) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto list_without_driver = [] {
+    // Loaders of different ages listen to different names.
+    for (const char* name : {"VK_ICD_FILENAMES", "VK_DRIVER_FILES"}) {
+      setenv(name, "/nonexistent/driver.json", 1);
+    }
+    std::string why;
+    const bool none = list_vulkan_devices(&why).empty();
+    const std::string error = error_of([] { open_vulkan_device(0, {}); });
+    std::cerr << why << error;
+    std::_Exit(none && !why.empty() && !error.empty() ? 0 : 1);
+  };
+  EXPECT_EXIT(list_without_driver(), ::testing::ExitedWithCode(0), "driver|loader");
+}
+
+TEST(VulkanDevices, MissingIndexIsAnError) {
+  REQUIRE_VULKAN_OR_SKIP();
+  EXPECT_THAT(error_of([] { open_vulkan_device(1000, {}); }), HasSubstr("no Vulkan device 1000"));
+  EXPECT_THAT(error_of([] { open_vulkan_device(-1, {}); }), HasSubstr("no Vulkan device -1"));
+}
+
+TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const auto device = open_vulkan_device(0, validated(20000));
+  KernelFixture match = small_match();
+  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  upload(*backend, match);
+  std::vector<double> shares;
+  backend->run(match.schedule(), [&](double share) { shares.push_back(share); });
+
+  EXPECT_GT(shares.size(), 3u);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_DOUBLE_EQ(shares.back(), 1);
+  int dispatches = 0;
+  for (const KernelTime& time : backend->times()) dispatches += time.dispatches;
+  EXPECT_EQ(dispatches, static_cast<int>(match.schedule().dispatches.size()));
+  EXPECT_EQ(backend->times().front().kernel, "initialise");
+  EXPECT_GT(backend->device_bytes(), 45u * 45 * 2 * 52);
+
+  // Planes of pixels that see the scene have a cost, and the checks ran.
+  const cv::Mat_<cv::Vec4f> planes = backend->hypotheses(1);
+  const cv::Mat_<cv::Vec4f> checks = backend->checks(1);
+  EXPECT_LT(planes(19, 19)[3], 1.0f);
+  EXPECT_GT(cv::norm(cv::Vec3f(planes(19, 19).val)), 0.1);
+  EXPECT_NE(checks(19, 19), cv::Vec4f());
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, BitsDependNeitherOnSplittingNorOnTheRun) {
+  REQUIRE_VULKAN_OR_SKIP();
+  KernelFixture match = small_match();
+  const cv::Mat expected = run(*open_vulkan_device(0, {}), match);
+  EXPECT_TRUE(same_bits(expected, run(*open_vulkan_device(0, {}), match)));
+  for (const long samples : {1L, 3000L, 1000000000000L}) {
+    DeviceRequest request;
+    request.max_samples_per_dispatch = samples;
+    EXPECT_TRUE(same_bits(expected, run(*open_vulkan_device(0, request), match))) << samples;
+  }
+}
+
+TEST(VulkanMatch, AMatcherCanRunAgain) {
+  REQUIRE_VULKAN_OR_SKIP();
+  KernelFixture match = small_match();
+  const auto device = open_vulkan_device(0, validated());
+  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const cv::Mat first = run(*backend, match);
+  EXPECT_TRUE(same_bits(first, run(*backend, match)));
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, AnAbortedRunLeavesTheMatcherUsable) {
+  REQUIRE_VULKAN_OR_SKIP();
+  KernelFixture match = small_match();
+  const auto device = open_vulkan_device(0, validated(5000));
+  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const cv::Mat expected = run(*backend, match);
+  EXPECT_THROW(backend->run(match.schedule(), [](double) { throw Error("Stop."); }), Error);
+  EXPECT_TRUE(same_bits(expected, run(*backend, match)));
+  EXPECT_THROW(backend->run(match.schedule(), [](double) { throw Error("Stop."); }), Error);
+  upload(*backend, match);  // with a submission still in flight
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, TexturesAndStorageImagesGiveTheSameBits) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  KernelFixture match = small_match();
+  std::vector<cv::Mat> results;
+  for (const bool sampled : {false, true}) {
+    VulkanBackend backend(application.context, sizes_of(match.rig()), match.schedule().constants,
+                          application.cache, {.sampled = sampled});
+    results.push_back(run(backend, match));
+  }
+  EXPECT_TRUE(same_bits(results[0], results[1]));
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, RecordsIntoAnApplicationsCommandBuffer) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  const VulkanContext adopted(application.context.handles());
+  PipelineCache cache(adopted, {});
+  KernelFixture match = small_match();
+  VulkanBackend backend(adopted, sizes_of(match.rig()), match.schedule().constants, cache);
+  const cv::Mat expected = run(backend, match);
+  const cv::Mat nothing(match.view(0).rays.size(), CV_32FC4, cv::Scalar::all(0));
+  backend.set_hypotheses(0, nothing);
+
+  const DeviceFunctions& vk = application.context.vk();
+  VkCommandPoolCreateInfo pool_info{};
+  pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  pool_info.queueFamilyIndex = application.context.queue_family();
+  VkCommandPool pool_handle = VK_NULL_HANDLE;
+  ASSERT_EQ(vk.vkCreateCommandPool(application.context.device(), &pool_info, nullptr, &pool_handle),
+            VK_SUCCESS);
+  const auto pool = application.context.own(pool_handle, vk.vkDestroyCommandPool);
+  Submission submission(application.context, pool.get(), 2);
+  backend.record(submission.begin(), match.schedule());
+  EXPECT_EQ(cv::norm(backend.hypotheses(0)), 0) << "record() must not run anything";
+  submission.submit();
+  submission.wait();
+  EXPECT_TRUE(same_bits(expected, download(backend, match.rig())));
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, RefusesWhatDoesNotFit) {
+  REQUIRE_VULKAN_OR_SKIP();
+  KernelFixture match = small_match();
+  const auto device = open_vulkan_device(0, {});
+  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  EXPECT_THAT(error_of([&] { backend->set_rays(1, match.view(0).rays); }), HasSubstr("38x38"));
+  EXPECT_THAT(error_of([&] { backend->set_intensity(0, match.view(0).rays); }),
+              HasSubstr("CV_32FC1"));
+  Schedule other = match.schedule();
+  other.constants.window_radius = 3;
+  EXPECT_THAT(error_of([&] { backend->run(other, {}); }), HasSubstr("constants"));
+  Schedule raster = match.schedule();
+  raster.dispatches[1].kernel = Kernel::iterate_raster;
+  EXPECT_THAT(error_of([&] { backend->run(raster, {}); }), HasSubstr("sequential"));
+}
+
+TEST(VulkanValidation, MissingLayerIsAnError) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults().no_layers = true;
+  const auto get = FaultyLoader::get_instance_proc_addr();
+  EXPECT_THAT(error_of([&] { open_vulkan_device(0, validated(), get); }),
+              HasSubstr("vulkan-validationlayers"));
+  EXPECT_EQ(error_of([&] { open_vulkan_device(0, {}, get); }), "");
+}
+
+TEST(VulkanValidation, ReportsAMissingBarrier) {
+  REQUIRE_VULKAN_OR_SKIP();
+  // The net must catch something: two clears of one image without a barrier between.
+  Application application;
+  const VulkanContext& context = application.context;
+  const DeviceFunctions& vk = context.vk();
+  const Buffer buffer = make_device_buffer(context, 64, VK_BUFFER_USAGE_TRANSFER_DST_BIT, "a test");
+  VkCommandPoolCreateInfo pool_info{};
+  pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  VkCommandPool pool_handle = VK_NULL_HANDLE;
+  ASSERT_EQ(vk.vkCreateCommandPool(context.device(), &pool_info, nullptr, &pool_handle),
+            VK_SUCCESS);
+  const auto pool = context.own(pool_handle, vk.vkDestroyCommandPool);
+  Submission submission(context, pool.get(), 2);
+  const VkCommandBuffer commands = submission.begin();
+  const float zeros[16] = {};
+  vk.vkCmdUpdateBuffer(commands, buffer.handle.get(), 0, sizeof zeros, zeros);
+  vk.vkCmdUpdateBuffer(commands, buffer.handle.get(), 0, sizeof zeros, zeros);
+  submission.submit();
+  submission.wait();
+  EXPECT_THAT(application.instance.validation_messages(),
+              ::testing::Contains(HasSubstr("SYNC-HAZARD-WRITE-AFTER-WRITE")));
+}
+
+class VulkanFailures : public ::testing::Test {
+ protected:
+  void SetUp() override { REQUIRE_VULKAN_OR_SKIP(); }
+
+  /// The message of a whole match through the faulty loader, which must not crash whatever fails.
+  std::string message_of_match() {
+    return error_of([this] {
+      const auto device = open_vulkan_device(0, request_, FaultyLoader::get_instance_proc_addr());
+      run(*device, match_);
+    });
+  }
+
+  KernelFixture match_ = small_match();
+  DeviceRequest request_;
+  FaultyLoader::Scope scope_;
+};
+
+TEST_F(VulkanFailures, EveryAllocationMayFail) {
+  EXPECT_EQ(message_of_match(), "");
+  const int allocations = FaultyLoader::faults().allocations;
+  EXPECT_GE(allocations, 8);
+  for (int i = 0; i < allocations; ++i) {
+    FaultyLoader::faults() = {.failing_allocation = i};
+    EXPECT_THAT(message_of_match(), HasSubstr("out of device memory")) << i;
+  }
+}
+
+TEST_F(VulkanFailures, TheDeviceMayBeLostAtAnySubmission) {
+  request_.max_samples_per_dispatch = 40000;
+  EXPECT_EQ(message_of_match(), "");
+  const int submissions = FaultyLoader::faults().submissions;
+  const int waits = FaultyLoader::faults().waits;
+  EXPECT_GE(submissions, 10);
+  EXPECT_EQ(waits, submissions);
+  // Clearing, an upload, in the middle of the run, the last download.
+  for (const int i : {0, 2, submissions / 2, submissions - 1}) {
+    FaultyLoader::faults() = {.failing_submission = i};
+    EXPECT_THAT(message_of_match(), HasSubstr("the device was lost")) << i;
+    FaultyLoader::faults() = {.failing_wait = i};
+    EXPECT_THAT(message_of_match(), HasSubstr("the device was lost")) << i;
+  }
+}
+
+TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
+  FaultyLoader::faults() = {.no_formats = true};
+  EXPECT_THAT(message_of_match(), HasSubstr("lacks storage images"));
+  FaultyLoader::faults() = {.no_compute_queues = true};
+  EXPECT_THAT(message_of_match(), HasSubstr("no compute queue"));
+  FaultyLoader::faults() = {.old_device = true};
+  EXPECT_THAT(message_of_match(), HasSubstr("offers Vulkan 1.0.0"));
+  FaultyLoader::faults() = {.largest_image = 40};
+  EXPECT_THAT(message_of_match(), HasSubstr("largest image width is 40"));
+  FaultyLoader::faults() = {.largest_push_constants = 16};
+  EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 36"));
+}
+
+TEST_F(VulkanFailures, MissingFunctionsAreNamed) {
+  for (const char* name : {"vkEnumerateInstanceVersion", "vkGetPhysicalDeviceProperties2",
+                           "vkCreateDevice", "vkCmdDispatch"}) {
+    FaultyLoader::faults() = {.missing_function = name};
+    EXPECT_THAT(message_of_match(), HasSubstr(name));
+  }
+}
+
+class VulkanCache : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    REQUIRE_VULKAN_OR_SKIP();
+    folder_ = std::filesystem::path(::testing::TempDir()) /
+              ("widestereo-cache-" + std::to_string(getpid()));
+    std::filesystem::create_directories(folder_);
+    path_ = folder_ / "pipelines.bin";
+  }
+  void TearDown() override {
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  }
+
+  cv::Mat match_with_cache() {
+    KernelFixture match = small_match();
+    DeviceRequest request;
+    request.pipeline_cache = path_.string();
+    return run(*open_vulkan_device(0, request), match);
+  }
+  bool is_used() {
+    Application application(false);
+    return PipelineCache(application.context, path_).loaded_from_file();
+  }
+  std::string content() const {
+    std::ifstream file(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  void overwrite(const std::string& content) const {
+    std::ofstream(path_, std::ios::binary) << content;
+  }
+
+  std::filesystem::path folder_;
+  std::filesystem::path path_;
+};
+
+TEST_F(VulkanCache, IsWrittenAndUsed) {
+  EXPECT_FALSE(is_used());
+  const cv::Mat first = match_with_cache();
+  EXPECT_TRUE(is_used());
+  const std::string written = content();
+  EXPECT_TRUE(same_bits(first, match_with_cache()));
+  EXPECT_EQ(content(), written);
+}
+
+TEST_F(VulkanCache, DamagedFilesAreIgnoredAndReplaced) {
+  const cv::Mat expected = match_with_cache();
+  const std::string intact = content();
+  std::string flipped = intact;
+  flipped.back() = static_cast<char>(flipped.back() ^ 1);
+  const std::vector<std::string> damaged = {
+      "",           "no cache", intact.substr(0, intact.size() - 1),
+      intact + "x", flipped,    std::string(intact.size(), '\0')};
+  for (const std::string& content_before : damaged) {
+    overwrite(content_before);
+    EXPECT_FALSE(is_used());
+    EXPECT_TRUE(same_bits(expected, match_with_cache()));
+    EXPECT_TRUE(is_used());
+  }
+}
+
+TEST_F(VulkanCache, UnwritablePathIsAnError) {
+  path_ = folder_ / "missing folder" / "pipelines.bin";
+  EXPECT_THAT(error_of([this] { match_with_cache(); }), HasSubstr("missing folder"));
+}
+
+TEST(Bands, CoverEveryRowOnceAndAddUp) {
+  const Schedule schedule = small_match().schedule();
+  for (const long long limit : {1LL, 999LL, 30000LL, 100000000LL}) {
+    const std::vector<Band> bands = split_into_bands(schedule, limit);
+    std::size_t next = 0;
+    for (const Dispatch& dispatch : schedule.dispatches) {
+      long long samples = 0;
+      int row = 0;
+      while (row < dispatch.height) {
+        ASSERT_LT(next, bands.size());
+        const Band& band = bands[next++];
+        ASSERT_EQ(band.dispatch, &dispatch);
+        ASSERT_EQ(band.first_row, row);
+        ASSERT_GT(band.last_row, row);
+        EXPECT_TRUE(band.work <= limit || band.last_row == row + 1);
+        samples += band.samples;
+        row = band.last_row;
+      }
+      EXPECT_EQ(row, dispatch.height);
+      EXPECT_EQ(samples, dispatch.samples);
+    }
+    EXPECT_EQ(next, bands.size());
+  }
+}
+
+TEST(Bands, AreGroupedWithinLimits) {
+  const Schedule schedule = small_match().schedule();
+  const std::vector<Band> bands = split_into_bands(schedule, 1000);
+  const auto groups = group_for_submission(bands, 5000, 3);
+  const Band* next = bands.data();
+  for (const auto group : groups) {
+    ASSERT_FALSE(group.empty());
+    EXPECT_EQ(group.data(), next);
+    EXPECT_LE(group.size(), 3u);
+    long long work = 0;
+    for (const Band& band : group) work += band.work;
+    EXPECT_TRUE(work <= 5000 || group.size() == 1);
+    next = group.data() + group.size();
+  }
+  EXPECT_EQ(next, bands.data() + bands.size());
+  EXPECT_TRUE(group_for_submission({}, 1, 1).empty());
+}
+
+}  // namespace
+}  // namespace widestereo::test
