@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#include "io/pfm.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <sstream>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+constexpr long largest_side = 65536;
+
+/// The next word of the header; leaves `position` after the one white-space character that ends it.
+std::string next_word(const std::vector<uchar>& bytes, std::size_t& position) {
+  const auto is_space = [](uchar c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
+  while (position < bytes.size() && is_space(bytes[position])) ++position;
+  std::string word;
+  while (position < bytes.size() && !is_space(bytes[position]) && word.size() < 64) {
+    word += static_cast<char>(bytes[position++]);
+  }
+  ++position;
+  return word;
+}
+
+double to_number(const std::string& word) {
+  std::istringstream stream(word);
+  double number = 0;
+  return stream >> number && stream.eof() ? number : std::nan("");
+}
+
+}  // namespace
+
+cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& bytes) {
+  std::size_t position = 0;
+  const std::string kind = next_word(bytes, position);
+  const double width = to_number(next_word(bytes, position));
+  const double height = to_number(next_word(bytes, position));
+  const double scale = to_number(next_word(bytes, position));
+  const bool good_size = width >= 1 && height >= 1 && width <= largest_side &&
+                         height <= largest_side && width == std::floor(width) &&
+                         height == std::floor(height);
+  if ((kind != "Pf" && kind != "PF") || !good_size || !std::isfinite(scale) || scale == 0) {
+    throw Error(path.string() + " has no valid PFM header; write it again.");
+  }
+  const int channels = kind == "PF" ? 3 : 1;
+  const auto rows = static_cast<std::size_t>(height);
+  const std::size_t row_bytes = static_cast<std::size_t>(width) * channels * sizeof(float);
+  if (bytes.size() < position || bytes.size() - position < row_bytes * rows) {
+    throw Error(path.string() + " is truncated; copy it again.");
+  }
+  cv::Mat map(static_cast<int>(height), static_cast<int>(width), CV_MAKETYPE(CV_32F, channels));
+  for (std::size_t i = 0; i < rows; ++i) {
+    uchar* row = map.ptr(static_cast<int>(rows - 1 - i));
+    std::memcpy(row, bytes.data() + position + i * row_bytes, row_bytes);
+    if (scale > 0) {  // big-endian
+      for (std::size_t j = 0; j < row_bytes; j += 4) std::reverse(row + j, row + j + 4);
+    }
+  }
+  return map;
+}
+
+void write_pfm(const std::filesystem::path& path, const cv::Mat& map) {
+  std::ofstream file(path, std::ios::binary);
+  file << (map.channels() == 3 ? "PF" : "Pf") << "\n"
+       << map.cols << " " << map.rows << "\n-1.0\n";
+  const auto row_bytes = static_cast<std::streamsize>(map.cols * map.elemSize());
+  for (int y = map.rows - 1; y >= 0; --y) {
+    file.write(reinterpret_cast<const char*>(map.ptr(y)), row_bytes);
+  }
+  if (!file.flush()) {
+    throw Error("Cannot write " + path.string() + "; check permissions and free space.");
+  }
+}
+
+}  // namespace widestereo
