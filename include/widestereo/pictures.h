@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+namespace widestereo {
+
+/// Distances (metres) at the two ends of a colour map.
+struct ColourRange {
+  double nearest = 0;
+  double farthest = 0;
+};
+
+/// The 2nd and 98th percentile of the inverse distances of a map, as distances.
+ColourRange robust_range(const cv::Mat& distance);
+
+/// All pictures are CV_8UC3 BGR of the map's size; pixels without a value are dark grey.
+/// Inverse distance in colours: near red, far blue.
+cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range);
+/// Normals (x right, y down, z forward, facing the camera) as red = (1 + x) / 2, green = (1 - y) / 2,
+/// blue = (1 - z) / 2: a wall that faces the camera is bluish, a floor green.
+cv::Mat normal_picture(const cv::Mat& normals);
+/// A map between two values from dark to bright.
+cv::Mat scalar_picture(const cv::Mat& map, double low, double high);
+/// Reason bits: the colour of the first bit set, the grey image where accepted.
+cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
+
+/// A picture with a legend below: the colour bar of distance_picture() with distances in metres.
+cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range);
+/// ... the colour bar of scalar_picture() with its end values.
+cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high);
+/// ... the colours of reason_picture().
+cv::Mat with_reason_legend(const cv::Mat& picture);
+
+struct Panel {
+  std::string title;
+  cv::Mat picture;  ///< 8 or 16 bit, grey or colour
+};
+/// Panels side by side, `columns` in a row, each scaled to the width of the first and titled.
+cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns);
+
+}  // namespace widestereo

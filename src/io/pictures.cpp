@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/pictures.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace widestereo {
+namespace {
+
+const cv::Scalar no_value(48, 48, 48);
+const cv::Scalar paper_colour(255, 255, 255);
+const cv::Scalar ink(30, 30, 30);
+
+/// Names and colours (BGR) of the Reason bits, lowest bit first.
+struct ReasonStyle {
+  const char* name;
+  cv::Vec3b colour;
+};
+const std::array<ReasonStyle, 8> reason_styles = {{{"no ray", {48, 48, 48}},
+                                                   {"no overlap", {160, 90, 40}},
+                                                   {"no texture", {200, 200, 60}},
+                                                   {"high cost", {60, 60, 220}},
+                                                   {"inconsistent", {40, 150, 250}},
+                                                   {"unchecked", {190, 80, 190}},
+                                                   {"low parallax", {120, 220, 120}},
+                                                   {"tilt", {200, 150, 250}}}};
+
+/// `share` in [0, 1] through a colour map; pixels where `valid` is 0 get the colour of no value.
+cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {
+  cv::Mat levels;
+  share.convertTo(levels, CV_8U, 255);
+  cv::Mat picture;
+  cv::applyColorMap(levels, picture, map);
+  picture.setTo(no_value, valid == 0);
+  return picture;
+}
+
+double text_scale(const cv::Mat& picture) { return std::max(0.35, picture.cols / 900.0); }
+
+/// The picture above an empty strip for a legend.
+cv::Mat with_strip(const cv::Mat& picture, int height) {
+  cv::Mat result;
+  cv::copyMakeBorder(picture, result, 0, height, 0, 0, cv::BORDER_CONSTANT, paper_colour);
+  return result;
+}
+
+void put_text(cv::Mat& picture, const std::string& text, cv::Point at, double scale,
+              double align = 0) {
+  const int thickness = scale > 0.8 ? 2 : 1;
+  int base = 0;
+  const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, &base);
+  const int x = std::clamp(at.x - static_cast<int>(align * size.width), 2,
+                           std::max(2, picture.cols - size.width - 2));
+  cv::putText(picture, text, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, ink, thickness, cv::LINE_AA);
+}
+
+std::string metres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, value < 1 ? "%.2f" : value < 10 ? "%.1f" : "%.0f", value);
+  return text;
+}
+
+/// A horizontal bar from share 0 to 1 with labels at given shares.
+cv::Mat with_bar(const cv::Mat& picture, int map,
+                 const std::vector<std::pair<double, std::string>>& labels) {
+  const double scale = text_scale(picture);
+  const int line = static_cast<int>(30 * scale);
+  const int margin = line / 2;
+  cv::Mat result = with_strip(picture, 3 * line);
+  const cv::Rect bar(margin, picture.rows + line / 2, picture.cols - 2 * margin, line);
+  cv::Mat ramp(1, bar.width, CV_32F);
+  for (int x = 0; x < bar.width; ++x) {
+    ramp.at<float>(0, x) = static_cast<float>(x) / static_cast<float>(bar.width - 1);
+  }
+  cv::Mat colours = coloured(ramp, cv::Mat(ramp.size(), CV_8U, 255), map);
+  cv::resize(colours, result(bar), bar.size(), 0, 0, cv::INTER_NEAREST);
+  cv::rectangle(result, bar, ink, 1);
+  for (const auto& [share, text] : labels) {
+    const int x = bar.x + static_cast<int>(share * (bar.width - 1));
+    cv::line(result, {x, bar.y + bar.height}, {x, bar.y + bar.height + line / 5}, ink, 1);
+    put_text(result, text, {x, bar.y + bar.height + line}, scale, 0.5);
+  }
+  return result;
+}
+
+cv::Mat as_bgr8(const cv::Mat& image) {
+  cv::Mat eight;
+  image.convertTo(eight, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1.0);
+  if (eight.channels() == 1) cv::cvtColor(eight, eight, cv::COLOR_GRAY2BGR);
+  if (eight.channels() == 4) cv::cvtColor(eight, eight, cv::COLOR_BGRA2BGR);
+  return eight;
+}
+
+}  // namespace
+
+ColourRange robust_range(const cv::Mat& distance) {
+  std::vector<float> inverse;
+  for (auto it = distance.begin<float>(); it != distance.end<float>(); ++it) {
+    if (*it > 0 && std::isfinite(*it)) inverse.push_back(1 / *it);
+  }
+  if (inverse.empty()) return {1, 10};
+  const auto percentile = [&](double p) {
+    const auto nth = inverse.begin() + static_cast<long>(p * static_cast<double>(inverse.size() - 1));
+    std::nth_element(inverse.begin(), nth, inverse.end());
+    return static_cast<double>(*nth);
+  };
+  const double low = percentile(0.02);
+  const double high = std::max(percentile(0.98), low * 1.01);
+  return {1 / high, 1 / low};
+}
+
+cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range) {
+  const double low = 1 / range.farthest;
+  const double high = 1 / range.nearest;
+  cv::Mat valid = distance > 0;
+  cv::Mat share;
+  cv::divide(1.0, distance, share, CV_32F);
+  share = (share - low) / (high - low);
+  share.setTo(0, ~valid);
+  return coloured(share, valid, cv::COLORMAP_TURBO);
+}
+
+cv::Mat normal_picture(const cv::Mat& normals) {
+  cv::Mat picture(normals.size(), CV_8UC3, no_value);
+  const auto level = [](float share) { return cv::saturate_cast<uchar>(255 * share); };
+  for (int y = 0; y < normals.rows; ++y) {
+    for (int x = 0; x < normals.cols; ++x) {
+      const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
+      if (n.dot(n) < 0.25f) continue;
+      picture.at<cv::Vec3b>(y, x) = {level((1 - n[2]) / 2), level((1 - n[1]) / 2),
+                                     level((1 + n[0]) / 2)};
+    }
+  }
+  return picture;
+}
+
+cv::Mat scalar_picture(const cv::Mat& map, double low, double high) {
+  return coloured((map - low) / (high - low), cv::Mat(map.size(), CV_8U, 255),
+                  cv::COLORMAP_VIRIDIS);
+}
+
+cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
+  cv::Mat picture = as_bgr8(image);
+  for (int y = 0; y < reasons.rows; ++y) {
+    for (int x = 0; x < reasons.cols; ++x) {
+      const int bits = reasons.at<uchar>(y, x);
+      for (std::size_t bit = 0; bit < reason_styles.size(); ++bit) {
+        if ((bits >> bit & 1) == 0) continue;
+        picture.at<cv::Vec3b>(y, x) = reason_styles[bit].colour;
+        break;
+      }
+    }
+  }
+  return picture;
+}
+
+cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range) {
+  std::vector<std::pair<double, std::string>> labels;
+  const double low = 1 / range.farthest;
+  const double high = 1 / range.nearest;
+  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    labels.emplace_back(share, metres(1 / (low + share * (high - low))) + " m");
+  }
+  return with_bar(picture, cv::COLORMAP_TURBO, labels);
+}
+
+cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high) {
+  return with_bar(picture, cv::COLORMAP_VIRIDIS,
+                  {{0.0, metres(low)}, {0.5, metres((low + high) / 2)}, {1.0, metres(high)}});
+}
+
+cv::Mat with_reason_legend(const cv::Mat& picture) {
+  const double scale = text_scale(picture);
+  const int line = static_cast<int>(30 * scale);
+  cv::Mat result = with_strip(picture, 3 * line);
+  const int column = picture.cols / 4;
+  for (int i = 0; i < 8; ++i) {
+    const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
+    const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
+    cv::rectangle(result, box, cv::Scalar(reason_styles[i].colour), cv::FILLED);
+    put_text(result, reason_styles[i].name, {at.x + line, at.y + line * 2 / 3}, scale * 0.8);
+  }
+  return result;
+}
+
+cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
+  const int width = panels.front().picture.cols;
+  const double scale = std::max(0.45, width / 700.0);
+  const int title = static_cast<int>(36 * scale);
+  const int gap = title / 3;
+  std::vector<cv::Mat> pictures;
+  int height = 0;
+  for (const Panel& panel : panels) {
+    cv::Mat picture = as_bgr8(panel.picture);
+    const double factor = static_cast<double>(width) / picture.cols;
+    cv::resize(picture, picture, {width, static_cast<int>(picture.rows * factor)}, 0, 0,
+               factor < 1 ? cv::INTER_AREA : cv::INTER_NEAREST);
+    height = std::max(height, picture.rows);
+    pictures.push_back(picture);
+  }
+  const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
+  cv::Mat sheet(rows * (height + title + gap) + gap, columns * (width + gap) + gap, CV_8UC3,
+                paper_colour);
+  for (int i = 0; i < static_cast<int>(panels.size()); ++i) {
+    const cv::Point corner(gap + i % columns * (width + gap), gap + i / columns * (height + title + gap));
+    put_text(sheet, panels[i].title, {corner.x + width / 2, corner.y + title * 3 / 4}, scale, 0.5);
+    pictures[i].copyTo(sheet(cv::Rect(corner + cv::Point(0, title), pictures[i].size())));
+  }
+  return sheet;
+}
+
+}  // namespace widestereo

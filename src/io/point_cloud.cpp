@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/point_cloud.h"
+
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+/// The image as 8-bit BGR, empty if it is empty.
+cv::Mat to_bgr8(const cv::Mat& image) {
+  if (image.empty()) return {};
+  cv::Mat eight;
+  image.convertTo(eight, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1.0);
+  cv::Mat colour = eight;
+  if (eight.channels() == 1) cv::cvtColor(eight, colour, cv::COLOR_GRAY2BGR);
+  if (eight.channels() == 4) cv::cvtColor(eight, colour, cv::COLOR_BGRA2BGR);
+  return colour;
+}
+
+template <class T>
+void append(std::vector<char>& bytes, const T& value) {
+  const auto* begin = reinterpret_cast<const char*>(&value);
+  bytes.insert(bytes.end(), begin, begin + sizeof value);
+}
+
+}  // namespace
+
+PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const cv::Mat& normals,
+                            const cv::Mat& image, const cv::Mat& confidence,
+                            const Eigen::Isometry3d& world_from_camera) {
+  for (const cv::Mat& map : {rays, normals, image, confidence}) {
+    if (!map.empty() && map.size() != distance.size()) {
+      throw Error("The maps of a point cloud differ in size; use maps of one view.");
+    }
+  }
+  const Eigen::Isometry3f world = world_from_camera.cast<float>();
+  const cv::Mat colours = to_bgr8(image);
+  PointCloud cloud;
+  for (int y = 0; y < distance.rows; ++y) {
+    for (int x = 0; x < distance.cols; ++x) {
+      const float d = distance.at<float>(y, x);
+      if (!(d > 0) || !std::isfinite(d)) continue;
+      const cv::Vec4f& ray = rays.at<cv::Vec4f>(y, x);
+      CloudPoint point{world * Eigen::Vector3f(d * ray[0], d * ray[1], d * ray[2]),
+                       Eigen::Vector3f::Zero(), 255, 255, 255, 1};
+      if (!normals.empty()) {
+        const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
+        point.normal = world.linear() * Eigen::Vector3f(n[0], n[1], n[2]);
+      }
+      if (!colours.empty()) {
+        const cv::Vec3b& bgr = colours.at<cv::Vec3b>(y, x);
+        point.red = bgr[2];
+        point.green = bgr[1];
+        point.blue = bgr[0];
+      }
+      if (!confidence.empty()) point.confidence = confidence.at<float>(y, x);
+      cloud.push_back(point);
+    }
+  }
+  return cloud;
+}
+
+void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
+  std::vector<char> bytes;
+  bytes.reserve(cloud.size() * 31);
+  for (const CloudPoint& point : cloud) {
+    for (int i = 0; i < 3; ++i) append(bytes, point.position[i]);
+    for (int i = 0; i < 3; ++i) append(bytes, point.normal[i]);
+    append(bytes, point.red);
+    append(bytes, point.green);
+    append(bytes, point.blue);
+    append(bytes, point.confidence);
+  }
+  write_atomically(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream file(temporary, std::ios::binary);
+    file << "ply\nformat binary_little_endian 1.0\ncomment world frame, metres\n"
+         << "element vertex " << cloud.size() << "\n"
+         << "property float x\nproperty float y\nproperty float z\n"
+         << "property float nx\nproperty float ny\nproperty float nz\n"
+         << "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+         << "property float confidence\nend_header\n";
+    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (!file.flush()) {
+      throw Error("Cannot write " + path.string() + "; check permissions and free space.");
+    }
+  });
+}
+
+}  // namespace widestereo
