@@ -25,6 +25,8 @@ struct RegionScores {
   double completeness = 0;          ///< share with a prediction
   std::map<double, double> bad_relative;  ///< threshold (0.005 = 0.5 %) -> share with larger relative error
   std::map<double, double> bad_pixels;    ///< threshold (px) -> share with larger displacement in the source
+  /// The same over the pixels that have a prediction (and, for pixels, one that projects into the source).
+  std::map<double, double> bad_relative_predicted, bad_pixels_predicted;
   double median_pixels = 0;         ///< px, predicted pixels
   double mean_absolute = 0;         ///< metres, predicted pixels
   double root_mean_square = 0;      ///< metres, predicted pixels
@@ -45,6 +47,30 @@ std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& norma
 /// The scores as a fixed-width table and as JSON text.
 std::string to_table(const std::vector<RegionScores>& scores);
 std::string to_json(const std::vector<RegionScores>& scores);
+
+/// Quality without ground truth, as in Table 1 of Hu et al.: shares over the pixels with a plane.
+struct ConsistencyScores {
+  double consistent_relative = 0;  ///< left-right difference of distance at most 2 %
+  double consistent_pixels = 0;    ///< left-right displacement at most 2 px
+  double low_cost = 0;             ///< cost 1 - ZNCC below 0.2
+  double mean_cost = 0;
+  long pixels = 0;
+};
+
+/// `differences`: CV_32FC2, relative difference and displacement in pixels; `cost`: CV_32FC1, 2 = no plane.
+ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost);
+
+/// One point of a sparsification curve: error of the most confident pixels.
+struct SparsificationPoint {
+  double kept = 0;          ///< share of the scored pixels kept
+  double confidence = 0;    ///< smallest confidence among them
+  double bad_pixels = 0;    ///< share of them displaced by more than 2 px
+};
+
+/// Ten points, from the most confident tenth to all non-occluded pixels. `confidence`: CV_32FC1.
+std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const cv::Mat& confidence,
+                                                const GroundTruth& truth, const View& reference,
+                                                const View& source);
 
 /// BGR picture of the relative error: green <= 0.5 %, yellow about 2 %, red >= 5 %, blue = no prediction,
 /// dimmed = occluded or outside the source view, black = no ground truth.

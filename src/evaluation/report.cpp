@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "widestereo/evaluation.h"
+
+namespace widestereo {
+namespace {
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[256];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+nlohmann::ordered_json shares(const std::map<double, double>& bad) {
+  nlohmann::ordered_json json;
+  for (const auto& [threshold, share] : bad) json[nlohmann::json(threshold).dump()] = share;
+  return json;
+}
+
+}  // namespace
+
+std::string to_table(const std::vector<RegionScores>& scores) {
+  std::string table = formatted("%-13s %8s %6s | %26s | %19s | %7s %7s %7s %7s | %s\n", "region",
+                                "pixels", "compl", "bad 0.5   1   2   5 % of d", "bad 0.5   1   2 px",
+                                "med px", "med %", "MAE m", "RMSE m", "normals med, mean deg");
+  for (const RegionScores& s : scores) {
+    if (s.pixels == 0) continue;
+    table += formatted("%-13s %8ld %5.1f%% |", s.region.c_str(), s.pixels, 100 * s.completeness);
+    for (const auto& [threshold, share] : s.bad_relative) table += formatted(" %5.1f%%", 100 * share);
+    table += " |";
+    for (const auto& [threshold, share] : s.bad_pixels) table += formatted(" %5.1f%%", 100 * share);
+    table += formatted(" | %7.3f %7.3f %7.4f %7.4f |", s.median_pixels, 100 * s.median_relative,
+                       s.mean_absolute, s.root_mean_square);
+    if (s.mean_normal_angle >= 0) {
+      table += formatted(" %5.1f %5.1f", s.median_normal_angle, s.mean_normal_angle);
+    }
+    table += "\n";
+  }
+  return table;
+}
+
+std::string to_json(const std::vector<RegionScores>& scores) {
+  nlohmann::ordered_json json = nlohmann::json::array();
+  for (const RegionScores& s : scores) {
+    json.push_back({{"region", s.region},
+                    {"pixels", s.pixels},
+                    {"completeness", s.completeness},
+                    {"bad_relative", shares(s.bad_relative)},
+                    {"bad_relative_predicted", shares(s.bad_relative_predicted)},
+                    {"bad_pixels", shares(s.bad_pixels)},
+                    {"bad_pixels_predicted", shares(s.bad_pixels_predicted)},
+                    {"median_pixels", s.median_pixels},
+                    {"median_relative", s.median_relative},
+                    {"median_absolute", s.median_absolute},
+                    {"mean_absolute", s.mean_absolute},
+                    {"root_mean_square", s.root_mean_square},
+                    {"mean_normal_angle", s.mean_normal_angle},
+                    {"median_normal_angle", s.median_normal_angle}});
+  }
+  return json.dump(2);
+}
+
+cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
+  cv::Mat picture = cv::Mat::zeros(distance.size(), CV_8UC3);
+  for (int y = 0; y < distance.rows; ++y) {
+    for (int x = 0; x < distance.cols; ++x) {
+      const float gt = truth.distance.at<float>(y, x);
+      const bool scored = gt > 0 && std::isfinite(gt) &&
+                          (truth.valid.empty() || truth.valid.at<uchar>(y, x) != 0);
+      if (!scored) continue;
+      const float d = distance.at<float>(y, x);
+      cv::Vec3d colour(200, 60, 30);
+      if (d > 0 && std::isfinite(d)) {
+        // Logarithmic from 0.5 % (green) over 1.6 % (yellow) to 5 % (red).
+        const double relative = std::abs(static_cast<double>(d) / static_cast<double>(gt) - 1);
+        const double t = std::clamp(std::log10(std::max(relative, 1e-6) / 0.005), 0.0, 1.0);
+        colour = {0, 200 * std::min(1.0, 2 - 2 * t), 255 * std::min(1.0, 2 * t)};
+      }
+      if (!truth.occlusion.empty() && truth.occlusion.at<uchar>(y, x) != 255) colour *= 0.45;
+      picture.at<cv::Vec3b>(y, x) = colour;
+    }
+  }
+  return picture;
+}
+
+}  // namespace widestereo
