@@ -22,12 +22,12 @@ constexpr double not_projected = std::numeric_limits<double>::quiet_NaN();
 /// One scored pixel.
 struct Sample {
   double truth = 0;
-  double theta = 0;                    ///< degrees
+  double theta = 0;  ///< degrees
   bool non_occluded = true;
   bool predicted = false;
-  double error = 0;                    ///< metres
-  double displacement = not_projected; ///< pixels in the source
-  double normal_angle = -1;            ///< degrees
+  double error = 0;                     ///< metres
+  double displacement = not_projected;  ///< pixels in the source
+  double normal_angle = -1;             ///< degrees
   double confidence = 0;
 };
 
@@ -63,8 +63,8 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   require_size(confidence, size, CV_32FC1, "confidence map");
   if (reference.camera.width != size.width || reference.camera.height != size.height) {
     throw Error("The distance map is " + std::to_string(size.width) + "x" +
-                std::to_string(size.height) + ", but the calibration of " + reference.name + " is " +
-                std::to_string(reference.camera.width) + "x" +
+                std::to_string(size.height) + ", but the calibration of " + reference.name +
+                " is " + std::to_string(reference.camera.width) + "x" +
                 std::to_string(reference.camera.height) + "; give the view's own map.");
   }
   const cv::Mat rays = ray_image(reference.camera, {});
@@ -84,8 +84,7 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       const cv::Vec4f& r = rays.at<cv::Vec4f>(y, x);
       const Eigen::Vector3d ray = Eigen::Vector3f(r[0], r[1], r[2]).cast<double>();
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * 180 / std::numbers::pi;
-      sample.non_occluded =
-          truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
+      sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
       if (!confidence.empty()) sample.confidence = static_cast<double>(confidence.at<float>(y, x));
       const float d = distance.at<float>(y, x);
       sample.predicted = has_distance(d);
@@ -154,7 +153,8 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
     scores.bad_pixels_predicted[t] = share_above(displacement, t, 0);
   }
   if (!samples.empty()) {
-    scores.completeness = static_cast<double>(relative.size()) / static_cast<double>(samples.size());
+    scores.completeness =
+        static_cast<double>(relative.size()) / static_cast<double>(samples.size());
   }
   scores.median_pixels = median_of(displacement);
   scores.mean_absolute = mean_of(absolute);

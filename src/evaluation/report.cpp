@@ -26,13 +26,15 @@ nlohmann::ordered_json shares(const std::map<double, double>& bad) {
 }  // namespace
 
 std::string to_table(const std::vector<RegionScores>& scores) {
-  std::string table = formatted("%-13s %8s %6s | %26s | %19s | %7s %7s %7s %7s | %s\n", "region",
-                                "pixels", "compl", "bad 0.5   1   2   5 % of d", "bad 0.5   1   2 px",
-                                "med px", "med %", "MAE m", "RMSE m", "normals med, mean deg");
+  std::string table =
+      formatted("%-13s %8s %6s | %26s | %19s | %7s %7s %7s %7s | %s\n", "region", "pixels", "compl",
+                "bad 0.5   1   2   5 % of d", "bad 0.5   1   2 px", "med px", "med %", "MAE m",
+                "RMSE m", "normals med, mean deg");
   for (const RegionScores& s : scores) {
     if (s.pixels == 0) continue;
     table += formatted("%-13s %8ld %5.1f%% |", s.region.c_str(), s.pixels, 100 * s.completeness);
-    for (const auto& [threshold, share] : s.bad_relative) table += formatted(" %5.1f%%", 100 * share);
+    for (const auto& [threshold, share] : s.bad_relative)
+      table += formatted(" %5.1f%%", 100 * share);
     table += " |";
     for (const auto& [threshold, share] : s.bad_pixels) table += formatted(" %5.1f%%", 100 * share);
     table += formatted(" | %7.3f %7.3f %7.4f %7.4f |", s.median_pixels, 100 * s.median_relative,
@@ -71,8 +73,8 @@ cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
   for (int y = 0; y < distance.rows; ++y) {
     for (int x = 0; x < distance.cols; ++x) {
       const float gt = truth.distance.at<float>(y, x);
-      const bool scored = gt > 0 && std::isfinite(gt) &&
-                          (truth.valid.empty() || truth.valid.at<uchar>(y, x) != 0);
+      const bool scored =
+          gt > 0 && std::isfinite(gt) && (truth.valid.empty() || truth.valid.at<uchar>(y, x) != 0);
       if (!scored) continue;
       const float d = distance.at<float>(y, x);
       cv::Vec3d colour(200, 60, 30);

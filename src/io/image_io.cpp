@@ -70,8 +70,9 @@ cv::Mat decode(const fs::path& path) {
     image.release();
   }
   if (image.empty()) {
-    throw Error(path.string() + " is not an image that can be read (or is truncated); use PNG, JPEG, "
-                                "TIFF, PGM or BMP.");
+    throw Error(path.string() +
+                " is not an image that can be read (or is truncated); use PNG, JPEG, "
+                "TIFF, PGM or BMP.");
   }
   return image;
 }

@@ -69,8 +69,7 @@ cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& by
 
 void write_pfm(const std::filesystem::path& path, const cv::Mat& map) {
   std::ofstream file(path, std::ios::binary);
-  file << (map.channels() == 3 ? "PF" : "Pf") << "\n"
-       << map.cols << " " << map.rows << "\n-1.0\n";
+  file << (map.channels() == 3 ? "PF" : "Pf") << "\n" << map.cols << " " << map.rows << "\n-1.0\n";
   const auto row_bytes = static_cast<std::streamsize>(map.cols * map.elemSize());
   for (int y = map.rows - 1; y >= 0; --y) {
     file.write(reinterpret_cast<const char*>(map.ptr(y)), row_bytes);

@@ -55,7 +55,8 @@ void put_text(cv::Mat& picture, const std::string& text, cv::Point at, double sc
   const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, &base);
   const int x = std::clamp(at.x - static_cast<int>(align * size.width), 2,
                            std::max(2, picture.cols - size.width - 2));
-  cv::putText(picture, text, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, ink, thickness, cv::LINE_AA);
+  cv::putText(picture, text, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, ink, thickness,
+              cv::LINE_AA);
 }
 
 std::string metres(double value) {
@@ -104,7 +105,8 @@ ColourRange robust_range(const cv::Mat& distance) {
   }
   if (inverse.empty()) return {1, 10};
   const auto percentile = [&](double p) {
-    const auto nth = inverse.begin() + static_cast<long>(p * static_cast<double>(inverse.size() - 1));
+    const auto nth =
+        inverse.begin() + static_cast<long>(p * static_cast<double>(inverse.size() - 1));
     std::nth_element(inverse.begin(), nth, inverse.end());
     return static_cast<double>(*nth);
   };
@@ -206,7 +208,8 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
   cv::Mat sheet(rows * (height + title + gap) + gap, columns * (width + gap) + gap, CV_8UC3,
                 paper_colour);
   for (int i = 0; i < static_cast<int>(panels.size()); ++i) {
-    const cv::Point corner(gap + i % columns * (width + gap), gap + i / columns * (height + title + gap));
+    const cv::Point corner(gap + i % columns * (width + gap),
+                           gap + i / columns * (height + title + gap));
     put_text(sheet, panels[i].title, {corner.x + width / 2, corner.y + title * 3 / 4}, scale, 0.5);
     pictures[i].copyTo(sheet(cv::Rect(corner + cv::Point(0, title), pictures[i].size())));
   }

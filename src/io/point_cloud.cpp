@@ -51,7 +51,11 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
       if (!(d > 0) || !std::isfinite(d)) continue;
       const cv::Vec4f& ray = rays.at<cv::Vec4f>(y, x);
       CloudPoint point{world * Eigen::Vector3f(d * ray[0], d * ray[1], d * ray[2]),
-                       Eigen::Vector3f::Zero(), 255, 255, 255, 1};
+                       Eigen::Vector3f::Zero(),
+                       255,
+                       255,
+                       255,
+                       1};
       if (!normals.empty()) {
         const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
         point.normal = world.linear() * Eigen::Vector3f(n[0], n[1], n[2]);
