@@ -26,7 +26,7 @@ long long default_max_samples(VkPhysicalDeviceType type) {
     case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
       return 300'000'000;
     default:
-      return 6'000'000;
+      return 20'000'000;
   }
 }
 
