@@ -97,8 +97,9 @@ void add_depth_command(CLI::App& app) {
       ->delimiter(',');
   command->add_option("--mask", arguments->masks,
                       "Image, 0 = ignore the pixel; once for all views or once for each");
-  command->add_option("--max-theta", arguments->max_theta,
-                      "Half angle of the lens's field of view, degrees")
+  command
+      ->add_option("--max-theta", arguments->max_theta,
+                   "Half angle of the lens's field of view, degrees")
       ->check(CLI::Range(1.0, 180.0));
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record as JSON");

@@ -19,8 +19,9 @@ void take(T& target, const std::optional<T>& given) {
 
 void MatchSettings::add_to(CLI::App& command) {
   const std::string devices = "Device";
-  command.add_option("--device", device.device,
-                     "auto, cpu, vulkan, vulkan:INDEX, vulkan:NAME PART or vulkan:UUID")
+  command
+      .add_option("--device", device.device,
+                  "auto, cpu, vulkan, vulkan:INDEX, vulkan:NAME PART or vulkan:UUID")
       ->capture_default_str()
       ->group(devices);
   command.add_flag("--validation", device.validation, "Vulkan: run with validation layers")

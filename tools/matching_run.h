@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Runs a match for the command line: opens the device, shows progress, reports the devices passed over.
+// Runs a match for the command line: opens the device, shows progress, reports the devices passed
+// over.
 #pragma once
 
 #include <opencv2/core/mat.hpp>

@@ -4,7 +4,8 @@
 #include <chrono>
 #include <string>
 
-/// A line on standard error with the share done and the time left; silent unless that is a terminal.
+/// A line on standard error with the share done and the time left; silent unless that is a
+/// terminal.
 class ProgressBar {
  public:
   explicit ProgressBar(std::string label);

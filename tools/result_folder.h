@@ -25,9 +25,9 @@ struct FolderContents {
   const widestereo::Rig& rig;
   const std::vector<cv::Mat>& images;
   const MatchingRun& run;
-  nlohmann::ordered_json origin;                 ///< where the images came from
-  std::vector<widestereo::GroundTruth> truths;   ///< one for each view, or none
-  std::vector<widestereo::RegionScores> scores;  ///< of view 0, or none
+  nlohmann::ordered_json origin = {};                 ///< where the images came from
+  std::vector<widestereo::GroundTruth> truths = {};   ///< one for each view, or none
+  std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none
 };
 
 /// Writes the folder, each file atomically and the record result.json last; returns the record.
@@ -36,4 +36,5 @@ nlohmann::ordered_json write_result_folder(const std::filesystem::path& folder,
                                            const FolderFormat& format);
 
 /// Prints the record, or a summary of it for people.
-void report(const nlohmann::ordered_json& record, const std::filesystem::path& folder, bool as_json);
+void report(const nlohmann::ordered_json& record, const std::filesystem::path& folder,
+            bool as_json);

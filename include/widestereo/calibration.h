@@ -17,8 +17,8 @@ struct Calibration {
 };
 
 /// Reads a Kalibr camchain YAML, a Basalt JSON or an OpenCV FileStorage (YAML, XML or JSON; fisheye
-/// stereo or omnidir) and validates it. Sizes come from the file; OpenCV files without an image size
-/// take `image_size` (pixels), which is otherwise ignored when empty and checked when given.
+/// stereo or omnidir) and validates it. Sizes come from the file; OpenCV files without an image
+/// size take `image_size` (pixels), which is otherwise ignored when empty and checked when given.
 /// Throws Error naming the file, the key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
@@ -26,7 +26,8 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
 /// Throws Error when a camera has no Kalibr form (skew, k3) or the file cannot be written.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
-/// Writes a Basalt JSON. Throws Error when a camera has no Basalt form or the file cannot be written.
+/// Writes a Basalt JSON. Throws Error when a camera has no Basalt form or the file cannot be
+/// written.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace widestereo

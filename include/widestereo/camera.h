@@ -14,14 +14,15 @@ namespace widestereo {
 /// Frame: x right, y down, z forward. Integer pixel coordinates are pixel centres.
 /// In the formulas d = |X|, rho = sqrt(x^2 + y^2), theta = atan2(rho, z).
 enum class CameraModel : int {
-  pinhole = 0,           ///< (x/z, y/z); domain z > 0
-  pinhole_radtan = 1,    ///< pinhole, then Brown-Conrady distortion k1 k2 p1 p2 (k3)
-  kannala_brandt = 2,    ///< theta (1 + k1 theta^2 + ... + k4 theta^8): OpenCV fisheye, Kalibr equidistant
+  pinhole = 0,         ///< (x/z, y/z); domain z > 0
+  pinhole_radtan = 1,  ///< pinhole, then Brown-Conrady distortion k1 k2 p1 p2 (k3)
+  kannala_brandt =
+      2,  ///< theta (1 + k1 theta^2 + ... + k4 theta^8): OpenCV fisheye, Kalibr equidistant
   double_sphere = 3,     ///< xi, alpha (Usenko, Demmel, Cremers, 3DV 2018)
   unified = 4,           ///< (x, y) / (z + xi d): Kalibr omni; xi = alpha / (1 - alpha)
   extended_unified = 5,  ///< alpha, beta (Khomutenko, Garcia, Martinet, RA-L 2016)
-  field_of_view = 6,     ///< omega (Devernay, Faugeras, 2001), with atan2: reaches beyond 90 degrees
-  mei = 7,               ///< unified, then Brown-Conrady: OpenCV omnidir, Kalibr omni + radtan
+  field_of_view = 6,  ///< omega (Devernay, Faugeras, 2001), with atan2: reaches beyond 90 degrees
+  mei = 7,            ///< unified, then Brown-Conrady: OpenCV omnidir, Kalibr omni + radtan
 };
 
 /// The model's name as used in messages, JSON and --help, for example "kannala_brandt".
@@ -30,18 +31,19 @@ std::string to_string(CameraModel model);
 /// Intrinsics of one camera. Members that the model does not use stay at their defaults.
 struct Camera {
   CameraModel model = CameraModel::pinhole;
-  int width = 0;                       ///< pixels
-  int height = 0;                      ///< pixels
+  int width = 0;                          ///< pixels
+  int height = 0;                         ///< pixels
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels; (0, 0) is the centre of the top left pixel
-  double skew = 0;                     ///< pixels: u = fx m_x + skew m_y + cx (K(0,1) of OpenCV)
-  double xi = 0;                       ///< double_sphere, unified, mei
-  double alpha = 0;                    ///< double_sphere, extended_unified
-  double beta = 1;                     ///< extended_unified
-  double omega = 0;                    ///< field_of_view, radians
+  double skew = 0;                        ///< pixels: u = fx m_x + skew m_y + cx (K(0,1) of OpenCV)
+  double xi = 0;                          ///< double_sphere, unified, mei
+  double alpha = 0;                       ///< double_sphere, extended_unified
+  double beta = 1;                        ///< extended_unified
+  double omega = 0;                       ///< field_of_view, radians
   double k1 = 0, k2 = 0, k3 = 0, k4 = 0;  ///< kannala_brandt: k1..k4; radtan: k1 k2 (k3)
-  double p1 = 0, p2 = 0;               ///< tangential part of radtan
-  /// Half angle of the lens's field of view in radians, measured from +z: rays beyond it are invalid
-  /// even where the model would project them (the model's domain is often wider than the lens).
+  double p1 = 0, p2 = 0;                  ///< tangential part of radtan
+  /// Half angle of the lens's field of view in radians, measured from +z: rays beyond it are
+  /// invalid even where the model would project them (the model's domain is often wider than the
+  /// lens).
   double max_theta = std::numbers::pi;
 };
 
@@ -59,8 +61,8 @@ bool project(const Camera& camera, const Eigen::Vector3d& point, Eigen::Vector2d
              Eigen::Matrix<double, 2, 3>& jacobian);
 
 /// Unit viewing ray of a pixel, which may lie outside the image and between pixel centres.
-/// Closed form, or Newton to better than 1e-6 px. Returns false when the pixel has no ray within the
-/// model's domain and the field of view; `ray` is unspecified then.
+/// Closed form, or Newton to better than 1e-6 px. Returns false when the pixel has no ray within
+/// the model's domain and the field of view; `ray` is unspecified then.
 bool unproject(const Camera& camera, const Eigen::Vector2d& pixel, Eigen::Vector3d& ray);
 
 /// Largest theta (radians) that the model itself can project, whatever max_theta says.
@@ -70,9 +72,9 @@ double model_max_theta(const Camera& camera);
 /// cx' = s (cx + 0.5) - 0.5).
 Camera resized(const Camera& camera, int width, int height);
 
-/// Unit rays of all pixels, CV_32FC4: (x, y, z, 1), or (x, y, z, 0) where the model has a ray but the
-/// field of view or the mask excludes the pixel, or zeros where there is no ray.
-/// `mask`: empty, or CV_8UC1 of the camera's size, 0 = excluded.
+/// Unit rays of all pixels, CV_32FC4: (x, y, z, 1), or (x, y, z, 0) where the model has a ray but
+/// the field of view or the mask excludes the pixel, or zeros where there is no ray. `mask`: empty,
+/// or CV_8UC1 of the camera's size, 0 = excluded.
 cv::Mat ray_image(const Camera& camera, const cv::Mat& mask);
 
 }  // namespace widestereo

@@ -11,26 +11,28 @@ enum class DeviceKind { cpu, vulkan };
 
 struct DeviceInfo {
   DeviceKind kind = DeviceKind::cpu;
-  std::string id;      ///< what Device::open takes: "cpu", "vulkan:0"
-  std::string name;    ///< as the driver says
-  std::string type;    ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu"
-  std::string driver;  ///< name and version, where known
-  std::string uuid;    ///< 32 hexadecimal digits, empty for the CPU
+  std::string id;        ///< what Device::open takes: "cpu", "vulkan:0"
+  std::string name;      ///< as the driver says
+  std::string type;      ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu"
+  std::string driver;    ///< name and version, where known
+  std::string uuid;      ///< 32 hexadecimal digits, empty for the CPU
   std::string unusable;  ///< why the device cannot be used, empty if it can
 };
 
 struct DeviceRequest {
-  /// "auto" (the best Vulkan device, else the CPU), "cpu", "vulkan", "vulkan:INDEX", "vulkan:NAME PART",
-  /// "vulkan:UUID".
+  /// "auto" (the best Vulkan device, else the CPU), "cpu", "vulkan", "vulkan:INDEX", "vulkan:NAME
+  /// PART", "vulkan:UUID".
   std::string device = "auto";
   bool validation = false;  ///< Vulkan: validation layers with synchronization validation
-  std::string pipeline_cache;  ///< Vulkan: file that keeps compiled pipelines between runs, empty for none
+  std::string
+      pipeline_cache;  ///< Vulkan: file that keeps compiled pipelines between runs, empty for none
   /// Vulkan: longest dispatch in patch samples, so that slow devices answer within watchdog limits;
   /// 0 chooses by device type. The result does not depend on it.
   long max_samples_per_dispatch = 0;
 };
 
-/// A compute device. Owns its handles; movable, not thread-safe; devices are independent of each other.
+/// A compute device. Owns its handles; movable, not thread-safe; devices are independent of each
+/// other.
 class Device {
  public:
   static Device open(const DeviceRequest& request);

@@ -5,8 +5,8 @@
 
 namespace widestereo {
 
-/// The only exception the library throws on purpose. The message is one sentence (or two) that names
-/// the file or value at fault and the remedy; it is fit to be shown to a user as it is.
+/// The only exception the library throws on purpose. The message is one sentence (or two) that
+/// names the file or value at fault and the remedy; it is fit to be shown to a user as it is.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

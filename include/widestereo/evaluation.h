@@ -12,20 +12,24 @@ namespace widestereo {
 
 /// What a distance map is scored against. Maps have the reference view's size.
 struct GroundTruth {
-  cv::Mat distance;   ///< CV_32FC1, metres along the unit ray; <= 0 or non-finite: no ground truth
-  cv::Mat valid;      ///< empty, or CV_8UC1, 0 = do not score
-  cv::Mat occlusion;  ///< empty, or CV_8UC1: 255 visible in the source view, 0 occluded, 128 outside it
-  cv::Mat normals;    ///< empty, or CV_32FC3, unit, reference frame
+  cv::Mat distance;  ///< CV_32FC1, metres along the unit ray; <= 0 or non-finite: no ground truth
+  cv::Mat valid;     ///< empty, or CV_8UC1, 0 = do not score
+  cv::Mat
+      occlusion;  ///< empty, or CV_8UC1: 255 visible in the source view, 0 occluded, 128 outside it
+  cv::Mat normals;  ///< empty, or CV_32FC3, unit, reference frame
 };
 
 /// Scores over one set of pixels. Shares lie in [0, 1]. A pixel without prediction counts as bad.
 struct RegionScores {
-  std::string region;               ///< "all", "non-occluded", "0-30", "30-60", "60-90", ">90" degrees
-  long pixels = 0;                  ///< pixels scored
-  double completeness = 0;          ///< share with a prediction
-  std::map<double, double> bad_relative;  ///< threshold (0.005 = 0.5 %) -> share with larger relative error
-  std::map<double, double> bad_pixels;    ///< threshold (px) -> share with larger displacement in the source
-  /// The same over the pixels that have a prediction (and, for pixels, one that projects into the source).
+  std::string region;       ///< "all", "non-occluded", "0-30", "30-60", "60-90", ">90" degrees
+  long pixels = 0;          ///< pixels scored
+  double completeness = 0;  ///< share with a prediction
+  std::map<double, double>
+      bad_relative;  ///< threshold (0.005 = 0.5 %) -> share with larger relative error
+  std::map<double, double>
+      bad_pixels;  ///< threshold (px) -> share with larger displacement in the source
+  /// The same over the pixels that have a prediction (and, for pixels, one that projects into the
+  /// source).
   std::map<double, double> bad_relative_predicted, bad_pixels_predicted;
   double median_pixels = 0;         ///< px, predicted pixels
   double mean_absolute = 0;         ///< metres, predicted pixels
@@ -37,9 +41,9 @@ struct RegionScores {
 };
 
 /// Scores `distance` (CV_32FC1, metres along the ray; <= 0 or non-finite = no prediction) of view
-/// `reference` against ground truth. Displacements are those of the predicted point's projection in view
-/// `source` from the true one's; a point that does not project there counts as bad.
-/// `normals` (may be empty) as in GroundTruth. Field-angle bands are taken over the non-occluded pixels.
+/// `reference` against ground truth. Displacements are those of the predicted point's projection in
+/// view `source` from the true one's; a point that does not project there counts as bad. `normals`
+/// (may be empty) as in GroundTruth. Field-angle bands are taken over the non-occluded pixels.
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source);
@@ -57,14 +61,15 @@ struct ConsistencyScores {
   long pixels = 0;
 };
 
-/// `differences`: CV_32FC2, relative difference and displacement in pixels; `cost`: CV_32FC1, 2 = no plane.
+/// `differences`: CV_32FC2, relative difference and displacement in pixels; `cost`: CV_32FC1, 2 =
+/// no plane.
 ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost);
 
 /// One point of a sparsification curve: error of the most confident pixels.
 struct SparsificationPoint {
-  double kept = 0;          ///< share of the scored pixels kept
-  double confidence = 0;    ///< smallest confidence among them
-  double bad_pixels = 0;    ///< share of them displaced by more than 2 px
+  double kept = 0;        ///< share of the scored pixels kept
+  double confidence = 0;  ///< smallest confidence among them
+  double bad_pixels = 0;  ///< share of them displaced by more than 2 px
 };
 
 /// Ten points, from the most confident tenth to all non-occluded pixels. `confidence`: CV_32FC1.
@@ -72,8 +77,8 @@ std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const c
                                                 const GroundTruth& truth, const View& reference,
                                                 const View& source);
 
-/// BGR picture of the relative error: green <= 0.5 %, yellow about 2 %, red >= 5 %, blue = no prediction,
-/// dimmed = occluded or outside the source view, black = no ground truth.
+/// BGR picture of the relative error: green <= 0.5 %, yellow about 2 %, red >= 5 %, blue = no
+/// prediction, dimmed = occluded or outside the source view, black = no ground truth.
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth);
 
 }  // namespace widestereo

@@ -8,27 +8,29 @@
 
 namespace widestereo {
 
-/// Writes a file atomically: `write` fills a temporary file beside `path` (same extension), which is
-/// renamed to `path` when it returns and removed when it throws. Throws Error naming `path`.
+/// Writes a file atomically: `write` fills a temporary file beside `path` (same extension), which
+/// is renamed to `path` when it returns and removed when it throws. Throws Error naming `path`.
 void write_atomically(const std::filesystem::path& path,
                       const std::function<void(const std::filesystem::path& temporary)>& write);
 
 /// Creates the folder (and parents) if needed and checks that files can be made in it.
 void prepare_output_folder(const std::filesystem::path& folder);
 
-/// Reads an 8- or 16-bit image, grey or BGR, depth kept. Throws Error (missing, truncated, no image).
+/// Reads an 8- or 16-bit image, grey or BGR, depth kept. Throws Error (missing, truncated, no
+/// image).
 cv::Mat read_image(const std::filesystem::path& path);
 
-/// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA image.
-/// Throws Error on other types, empty images and non-finite values; `name` begins the message.
+/// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA
+/// image. Throws Error on other types, empty images and non-finite values; `name` begins the
+/// message.
 cv::Mat to_intensity(const cv::Mat& image, const std::string& name);
 
-/// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm or .png (16 bit, divided by
-/// `png_scale`, which is the PNG units per metre). Throws Error.
+/// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm or .png (16 bit, divided
+/// by `png_scale`, which is the PNG units per metre). Throws Error.
 cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);
 
-/// Writes a CV_32FC1 or CV_32FC3 (x y z) map by extension: .tiff (32-bit float), .pfm, or .png (16 bit,
-/// CV_32FC1 only: round(value * png_scale), 0 where not positive or not representable).
+/// Writes a CV_32FC1 or CV_32FC3 (x y z) map by extension: .tiff (32-bit float), .pfm, or .png (16
+/// bit, CV_32FC1 only: round(value * png_scale), 0 where not positive or not representable).
 void write_map(const std::filesystem::path& path, const cv::Mat& map, double png_scale = 1000.0);
 
 /// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension).

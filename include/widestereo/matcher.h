@@ -13,26 +13,30 @@
 
 namespace widestereo {
 
-/// Why a pixel was rejected: bits of ViewResult::reasons (values of the kernels, shaders/check.glsl).
+/// Why a pixel was rejected: bits of ViewResult::reasons (values of the kernels,
+/// shaders/check.glsl).
 enum Reason : std::uint8_t {
   reason_no_ray = 1,         ///< outside the lens, the model's domain or the mask
   reason_no_overlap = 2,     ///< no plane there is visible in any source view
   reason_no_texture = 4,     ///< the patch carries no information
   reason_high_cost = 8,      ///< cost above Options::max_cost
   reason_inconsistent = 16,  ///< the source view's own plane disagrees
-  reason_unchecked = 32,     ///< the point does not project to a pixel with a plane in the source view
+  reason_unchecked = 32,  ///< the point does not project to a pixel with a plane in the source view
   reason_low_parallax = 64,  ///< the distance is not observable here (near an epipole)
   reason_tilt = 128,         ///< the plane is seen at too grazing an angle
 };
 
 /// Result for one reference view. All maps have the view's size.
 struct ViewResult {
-  cv::Mat hypotheses;  ///< CV_32FC4 (m, cost): plane {X : m . X = 1} in the camera frame, 1/metres; cost 2 = none
-  cv::Mat distance;    ///< CV_32FC1, metres along the unit ray, 0 where there is no plane; not filtered
-  cv::Mat normals;     ///< CV_32FC3, unit, camera frame, facing the camera; 0 where there is no plane
-  cv::Mat cost;        ///< CV_32FC1, 1 - ZNCC in [0, 2]
-  /// CV_32FC2: relative difference of distance (share) and displacement (pixels) between the pixel's point
-  /// and where the best agreeing source view's own plane puts it; 1000 where that cannot be measured.
+  cv::Mat hypotheses;  ///< CV_32FC4 (m, cost): plane {X : m . X = 1} in the camera frame, 1/metres;
+                       ///< cost 2 = none
+  cv::Mat
+      distance;  ///< CV_32FC1, metres along the unit ray, 0 where there is no plane; not filtered
+  cv::Mat normals;  ///< CV_32FC3, unit, camera frame, facing the camera; 0 where there is no plane
+  cv::Mat cost;     ///< CV_32FC1, 1 - ZNCC in [0, 2]
+  /// CV_32FC2: relative difference of distance (share) and displacement (pixels) between the
+  /// pixel's point and where the best agreeing source view's own plane puts it; 1000 where that
+  /// cannot be measured.
   cv::Mat differences;
   cv::Mat confidence;  ///< CV_32FC1 in [0, 1]
   cv::Mat reasons;     ///< CV_8UC1, Reason bits; 0 = accepted
@@ -45,11 +49,11 @@ struct KernelTime {
 };
 
 struct StereoResult {
-  std::vector<ViewResult> views;     ///< one for each view of the rig
-  std::vector<KernelTime> times;     ///< per kernel, in order of first use
-  double milliseconds = 0;           ///< wall time of match(), uploads and downloads included
-  long long samples = 0;             ///< patch samples of the schedule at full windows (an upper bound)
-  std::size_t device_bytes = 0;      ///< memory taken on the device
+  std::vector<ViewResult> views;  ///< one for each view of the rig
+  std::vector<KernelTime> times;  ///< per kernel, in order of first use
+  double milliseconds = 0;        ///< wall time of match(), uploads and downloads included
+  long long samples = 0;         ///< patch samples of the schedule at full windows (an upper bound)
+  std::size_t device_bytes = 0;  ///< memory taken on the device
 };
 
 /// `distance` with rejected pixels (reasons != 0) set to 0.
@@ -68,7 +72,8 @@ class Matcher {
   Matcher(Matcher&&) noexcept;
   Matcher& operator=(Matcher&&) noexcept;
 
-  /// One image per view: 8 or 16 bit, grey or colour. The same seed gives the same bits on one device.
+  /// One image per view: 8 or 16 bit, grey or colour. The same seed gives the same bits on one
+  /// device.
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress = {});
   StereoResult match(const cv::Mat& left, const cv::Mat& right, const Progress& progress = {}) {
     return match(std::vector<cv::Mat>{left, right}, progress);

@@ -33,22 +33,25 @@ struct Options {
   double max_distance = 50;   ///< metres along the ray, > min_distance, finite
   std::uint32_t seed = 1;
 
-  int window_radius = 5;      ///< patch of (2 r + 1)^2 pixels, 1..15
+  int window_radius = 5;  ///< patch of (2 r + 1)^2 pixels, 1..15
   PatchWarp warp = PatchWarp::exact;
   DistanceSampling sampling = DistanceSampling::uniform;
   Propagation propagation = Propagation::checkerboard;
   int first_iterations = 60;  ///< of the first view, started from random planes, >= 1
   int second_iterations = 8;  ///< of every further view, started from the first one's planes, >= 0
-  int refinements = 4;        ///< random perturbations per pixel and iteration, 0..16; range halved each time
-  int best_sources = 1;       ///< cost = mean of this many best source views, >= 1
-  double min_texture = 0.5;   ///< grey levels (of 255): patches with a smaller standard deviation carry no information
-  double min_visible = 0.6;   ///< share of the patch that must be seen in the source, 0..1
+  int refinements =
+      4;  ///< random perturbations per pixel and iteration, 0..16; range halved each time
+  int best_sources = 1;      ///< cost = mean of this many best source views, >= 1
+  double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation
+                             ///< carry no information
+  double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0..1
 
-  double consistency_relative = 0.02;  ///< left-right check: largest relative difference of distance
-  double consistency_pixels = 1.0;     ///< left-right check: largest displacement in pixels
-  double max_cost = 0.5;               ///< largest 1 - ZNCC accepted, 0..2
-  double min_parallax = 0.5;           ///< pixels between min_distance and max_distance in the source view
-  double max_tilt = 85;                ///< degrees between the normal and the viewing ray, 0..90
+  double consistency_relative =
+      0.02;                         ///< left-right check: largest relative difference of distance
+  double consistency_pixels = 1.0;  ///< left-right check: largest displacement in pixels
+  double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2
+  double min_parallax = 0.5;  ///< pixels between min_distance and max_distance in the source view
+  double max_tilt = 85;       ///< degrees between the normal and the viewing ray, 0..90
 
   /// Throws Error for an unknown name. Presets: "paper".
   static Options preset_named(const std::string& name);

@@ -19,8 +19,8 @@ ColourRange robust_range(const cv::Mat& distance);
 /// All pictures are CV_8UC3 BGR of the map's size; pixels without a value are dark grey.
 /// Inverse distance in colours: near red, far blue.
 cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range);
-/// Normals (x right, y down, z forward, facing the camera) as red = (1 + x) / 2, green = (1 - y) / 2,
-/// blue = (1 - z) / 2: a wall that faces the camera is bluish, a floor green.
+/// Normals (x right, y down, z forward, facing the camera) as red = (1 + x) / 2, green = (1 - y) /
+/// 2, blue = (1 - z) / 2: a wall that faces the camera is bluish, a floor green.
 cv::Mat normal_picture(const cv::Mat& normals);
 /// A map between two values from dark to bright.
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high);

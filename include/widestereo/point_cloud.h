@@ -17,9 +17,10 @@ struct CloudPoint {
 };
 using PointCloud = std::vector<CloudPoint>;
 
-/// The points of every pixel with a positive, finite distance (CV_32FC1, metres along the ray), in the world
-/// frame. `rays`: CV_32FC4 as from ray_image(). `normals` (CV_32FC3), `image` (8 or 16 bit, grey, BGR or BGRA)
-/// and `confidence` (CV_32FC1) may be empty. Throws Error when sizes differ.
+/// The points of every pixel with a positive, finite distance (CV_32FC1, metres along the ray), in
+/// the world frame. `rays`: CV_32FC4 as from ray_image(). `normals` (CV_32FC3), `image` (8 or 16
+/// bit, grey, BGR or BGRA) and `confidence` (CV_32FC1) may be empty. Throws Error when sizes
+/// differ.
 PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const cv::Mat& normals,
                             const cv::Mat& image, const cv::Mat& confidence,
                             const Eigen::Isometry3d& world_from_camera);

@@ -12,10 +12,10 @@ namespace widestereo {
 
 /// One calibrated camera of a rig.
 struct View {
-  std::string name;                    ///< "cam0", ... as in the calibration file
+  std::string name;  ///< "cam0", ... as in the calibration file
   Camera camera;
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();  ///< metres
-  cv::Mat mask;                        ///< empty, or CV_8UC1 of the camera's size, 0 = excluded
+  cv::Mat mask;  ///< empty, or CV_8UC1 of the camera's size, 0 = excluded
 };
 
 /// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a file).

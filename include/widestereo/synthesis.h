@@ -23,16 +23,17 @@ struct RenderedPair {
   std::vector<RenderedView> views;  ///< as many as rig.views
 };
 
-/// The scene of `widestereo demo`: a textured room with slanted and curved surfaces and occlusions, seen by
-/// two double-sphere cameras of 195 degrees with a 0.1 m baseline; surfaces reach beyond 90 degrees off axis.
-/// `size` is the side of the square images in pixels; the field of view does not depend on it.
+/// The scene of `widestereo demo`: a textured room with slanted and curved surfaces and occlusions,
+/// seen by two double-sphere cameras of 195 degrees with a 0.1 m baseline; surfaces reach beyond 90
+/// degrees off axis. `size` is the side of the square images in pixels; the field of view does not
+/// depend on it.
 RenderedPair render_demo(int size, std::uint32_t seed = 1);
 
 /// Nearest and farthest distance (metres) that suit the demo scene.
 std::pair<double, double> demo_distance_range();
 
-/// One textured slanted plane filling both views, for tests: {X : normal . X = offset} in the world frame
-/// (metres), seen by the rig's views, with a smooth random texture.
+/// One textured slanted plane filling both views, for tests: {X : normal . X = offset} in the world
+/// frame (metres), seen by the rig's views, with a smooth random texture.
 RenderedPair render_plane(const Rig& rig, const Eigen::Vector3d& normal, double offset,
                           std::uint32_t seed = 1);
 

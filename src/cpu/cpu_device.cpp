@@ -33,7 +33,8 @@ class CpuBackend final : public Backend {
       views_[i].hypotheses.create(sizes[i]);
       views_[i].checks.create(sizes[i]);
       bytes_ += static_cast<std::size_t>(sizes[i].area()) * (3 * sizeof(cv::Vec4f) + sizeof(float));
-      largest = {std::max(largest.width, sizes[i].width), std::max(largest.height, sizes[i].height)};
+      largest = {std::max(largest.width, sizes[i].width),
+                 std::max(largest.height, sizes[i].height)};
     }
     transfer_nearest_.create(largest);
     transfer_winner_.create(largest);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The shared kernel source compiled for the CPU: the accessors it reads and writes through, then the
-// algorithm itself.
+// The shared kernel source compiled for the CPU: the accessors it reads and writes through, then
+// the algorithm itself.
 #pragma once
 
 #include <atomic>
@@ -83,7 +83,8 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
   }
 }
 
-// clang-format off: the order matters
+// The order matters.
+// clang-format off
 #include "random.glsl"
 #include "plane.glsl"
 #include "patch.glsl"

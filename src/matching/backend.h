@@ -48,7 +48,8 @@ class Backend {
   /// Plane hypotheses (m, cost), CV_32FC4.
   virtual cv::Mat hypotheses(int view) = 0;
   virtual void set_hypotheses(int view, const cv::Mat& hypotheses) = 0;
-  /// What the check kernel wrote, CV_32FC4: relative difference, displacement (px), confidence, reason bits.
+  /// What the check kernel wrote, CV_32FC4: relative difference, displacement (px), confidence,
+  /// reason bits.
   virtual cv::Mat checks(int view) = 0;
   /// Device time per kernel of the last run.
   virtual std::vector<KernelTime> times() const = 0;

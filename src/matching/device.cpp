@@ -65,7 +65,8 @@ std::unique_ptr<Device::Implementation> open_matching(const std::string& wanted,
     }
     return open_vulkan_device(index_of(device), request);
   }
-  throw Error("No Vulkan device is called \"" + wanted + "\"; there are: " + names_of(devices) + ".");
+  throw Error("No Vulkan device is called \"" + wanted + "\"; there are: " + names_of(devices) +
+              ".");
 }
 
 std::unique_ptr<Device::Implementation> open_best(const DeviceRequest& request) {

@@ -64,8 +64,9 @@ class Matcher::Implementation {
   Implementation(Device& device, const Rig& rig, const Options& options)
       : rig_(rig), schedule_(make_schedule(rig, options)) {
     if (options.propagation == Propagation::raster && device.info().kind != DeviceKind::cpu) {
-      throw Error("Raster-order propagation is sequential and runs on the CPU only; choose the "
-                  "device \"cpu\" or checkerboard propagation.");
+      throw Error(
+          "Raster-order propagation is sequential and runs on the CPU only; choose the "
+          "device \"cpu\" or checkerboard propagation.");
     }
     std::vector<cv::Size> sizes;
     for (const View& view : rig_.views) {

@@ -39,9 +39,10 @@ std::vector<std::string> Options::preset_names() { return {"paper"}; }
 void validate(const Options& o) {
   if (!std::isfinite(o.min_distance) || !std::isfinite(o.max_distance) || o.min_distance <= 0 ||
       o.max_distance <= o.min_distance) {
-    throw Error("The distance range " + nlohmann::json(o.min_distance).dump() + " to " +
-                nlohmann::json(o.max_distance).dump() +
-                " m is not usable: give a positive nearest and a larger, finite farthest distance.");
+    throw Error(
+        "The distance range " + nlohmann::json(o.min_distance).dump() + " to " +
+        nlohmann::json(o.max_distance).dump() +
+        " m is not usable: give a positive nearest and a larger, finite farthest distance.");
   }
   require_between(o.window_radius, 1, 15, "window radius");
   require_between(o.first_iterations, 1, 100000, "first iterations");

@@ -151,8 +151,8 @@ const char* to_string(Kernel kernel) {
 
 Schedule make_schedule(const Rig& rig, const Options& options) {
   if (rig.views.size() < 2 || rig.views.size() > MAX_VIEWS) {
-    throw Error("The rig has " + std::to_string(rig.views.size()) +
-                " view(s); stereo needs 2 to " + std::to_string(MAX_VIEWS) + ".");
+    throw Error("The rig has " + std::to_string(rig.views.size()) + " view(s); stereo needs 2 to " +
+                std::to_string(MAX_VIEWS) + ".");
   }
   validate(rig, "The rig");
   validate(options);

@@ -10,7 +10,8 @@
 
 namespace widestereo {
 
-/// Every kernel; each has one entry point per back end, named as to_string() says (shaders/NAME.comp).
+/// Every kernel; each has one entry point per back end, named as to_string() says
+/// (shaders/NAME.comp).
 enum class Kernel {
   initialise,        ///< random planes of a view and their cost
   iterate,           ///< one colour: candidates of the neighbours, then random refinements
@@ -33,13 +34,14 @@ struct KernelConstants {
   bool operator==(const KernelConstants&) const = default;
 };
 
-/// One launch over all pixels of view `pass.reference`. Writes of one dispatch are visible to the next.
+/// One launch over all pixels of view `pass.reference`. Writes of one dispatch are visible to the
+/// next.
 struct Dispatch {
   Kernel kernel = Kernel::initialise;
   kernel::PassParameters pass{};
-  int width = 0;             ///< pixels of the reference view
+  int width = 0;  ///< pixels of the reference view
   int height = 0;
-  long long samples = 0;     ///< patch samples at full windows, for splitting and progress
+  long long samples = 0;  ///< patch samples at full windows, for splitting and progress
 };
 
 struct Schedule {
@@ -48,7 +50,8 @@ struct Schedule {
   std::vector<Dispatch> dispatches;
 };
 
-/// Throws Error when rig or options are invalid, or there are fewer than 2 or more than MAX_VIEWS views.
+/// Throws Error when rig or options are invalid, or there are fewer than 2 or more than MAX_VIEWS
+/// views.
 Schedule make_schedule(const Rig& rig, const Options& options);
 
 }  // namespace widestereo

@@ -12,15 +12,15 @@
 
 namespace widestereo::test {
 
-/// Opens a device, or skips the test with the reason; where WIDESTEREO_REQUIRE_VULKAN is set, a missing
-/// Vulkan device or validation layer fails it instead.
-#define OPEN_DEVICE_OR_SKIP(device, name)                                                    \
-  std::optional<::widestereo::Device> device;                                                \
-  try {                                                                                      \
-    device.emplace(::widestereo::test::open_validated(name));                                \
-  } catch (const ::widestereo::Error& error) {                                               \
-    if (std::getenv("WIDESTEREO_REQUIRE_VULKAN") != nullptr) FAIL() << error.what();          \
-    GTEST_SKIP() << error.what();                                                            \
+/// Opens a device, or skips the test with the reason; where WIDESTEREO_REQUIRE_VULKAN is set, a
+/// missing Vulkan device or validation layer fails it instead.
+#define OPEN_DEVICE_OR_SKIP(device, name)                                            \
+  std::optional<::widestereo::Device> device;                                        \
+  try {                                                                              \
+    device.emplace(::widestereo::test::open_validated(name));                        \
+  } catch (const ::widestereo::Error& error) {                                       \
+    if (std::getenv("WIDESTEREO_REQUIRE_VULKAN") != nullptr) FAIL() << error.what(); \
+    GTEST_SKIP() << error.what();                                                    \
   }
 
 inline Device open_validated(const std::string& name, long max_samples_per_dispatch = 0) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Every back end must compute what the CPU reference computes: single steps to rounding, whole matches by
-// statistics (PatchMatch turns rounding differences into different winners at ties).
+// Every back end must compute what the CPU reference computes: single steps to rounding, whole
+// matches by statistics (PatchMatch turns rounding differences into different winners at ties).
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
@@ -87,7 +87,8 @@ TEST_P(Parity, InitialPlanesAndCostsAgree) {
     ASSERT_GT(cost_differences.size(), 2000u);
     std::sort(cost_differences.begin(), cost_differences.end());
     const auto percentile = [&](double p) {
-      return cost_differences[static_cast<std::size_t>(p * (cost_differences.size() - 1.0))];
+      return cost_differences[static_cast<std::size_t>(
+          p * static_cast<double>(cost_differences.size() - 1))];
     };
     EXPECT_EQ(planes_differ, 0);
     EXPECT_LE(validity_differs, 3);
@@ -134,8 +135,10 @@ TEST_P(EveryDevice, FindsTheDemoSceneTwiceWithTheSameBits) {
   const StereoResult first = matcher.match(images_of(pair));
   const StereoResult second = matcher.match(images_of(pair));
   for (int view = 0; view < 2; ++view) {
-    EXPECT_EQ(cv::norm(first.views[view].hypotheses, second.views[view].hypotheses, cv::NORM_INF), 0);
-    EXPECT_EQ(cv::norm(first.views[view].confidence, second.views[view].confidence, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(first.views[view].hypotheses, second.views[view].hypotheses, cv::NORM_INF),
+              0);
+    EXPECT_EQ(cv::norm(first.views[view].confidence, second.views[view].confidence, cv::NORM_INF),
+              0);
     const std::vector<RegionScores> scores =
         evaluate(first.views[view].distance, first.views[view].normals, pair.views[view].truth,
                  pair.rig.views[view], pair.rig.views[1 - view]);
@@ -169,8 +172,9 @@ TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
   options.first_iterations = 8;
   const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
   for (int view = 0; view < 2; ++view) {
-    const std::vector<RegionScores> scores = evaluate(
-        result.views[view].distance, {}, pair.views[view].truth, rig.views[view], rig.views[1 - view]);
+    const std::vector<RegionScores> scores =
+        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
+                 rig.views[1 - view]);
     EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.2) << to_table(scores);
   }
   expect_no_validation_messages(*device);
@@ -181,7 +185,8 @@ TEST_P(EveryDevice, UsesThreeViews) {
   Rig rig = render_demo(64).rig;
   rig.views.push_back(rig.views[1]);
   rig.views[2].name = "cam2";
-  rig.views[2].world_from_camera = Eigen::Translation3d(0, 0.12, 0) * rig.views[0].world_from_camera;
+  rig.views[2].world_from_camera =
+      Eigen::Translation3d(0, 0.12, 0) * rig.views[0].world_from_camera;
   const RenderedPair pair = render_plane(rig, {0, 0.1, 1}, 1.2);
   Options options;
   options.min_distance = 0.5;

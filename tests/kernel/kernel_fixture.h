@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Two views with random smooth images, ready for calling the kernels of the CPU back end one by one.
+// Two views with random smooth images, ready for calling the kernels of the CPU back end one by
+// one.
 #pragma once
 
 #include <opencv2/imgproc.hpp>
@@ -10,7 +11,8 @@
 
 namespace widestereo::test {
 
-/// TUM-VI-like double-sphere camera of `size` x `size` pixels that sees `max_theta` radians off axis.
+/// TUM-VI-like double-sphere camera of `size` x `size` pixels that sees `max_theta` radians off
+/// axis.
 inline Camera fisheye_camera(int size, double max_theta = 1.7) {
   Camera camera;
   camera.model = CameraModel::double_sphere;

@@ -14,7 +14,8 @@ using kernel::vec3;
 
 /// Bilinear sample, or nothing outside the image or beside a masked pixel.
 bool sample(const cv::Mat_<float>& image, const Eigen::Vector2d& u, double& value) {
-  if (!(u.x() >= 0 && u.y() >= 0 && u.x() <= image.cols - 1 && u.y() <= image.rows - 1)) return false;
+  if (!(u.x() >= 0 && u.y() >= 0 && u.x() <= image.cols - 1 && u.y() <= image.rows - 1))
+    return false;
   const int x = std::min(static_cast<int>(u.x()), image.cols - 2);
   const int y = std::min(static_cast<int>(u.y()), image.rows - 2);
   const double fx = u.x() - x;
@@ -29,8 +30,8 @@ bool sample(const cv::Mat_<float>& image, const Eigen::Vector2d& u, double& valu
   return true;
 }
 
-/// The definition, term by term: intersect every ray of the patch with the plane, move the point to the
-/// source, project it, sample, and take the normalised correlation. Returns 2 where invalid.
+/// The definition, term by term: intersect every ray of the patch with the plane, move the point to
+/// the source, project it, sample, and take the normalised correlation. Returns 2 where invalid.
 double literal_cost(KernelFixture& fixture, int reference, int source, ivec2 pixel,
                     const Eigen::Vector3d& m, int radius, double min_visible) {
   const Rig& rig = fixture.rig();
@@ -118,7 +119,8 @@ TEST_P(PatchCost, AgreesWithTheLiteralDefinition) {
     const Eigen::Vector3d m =
         random_plane(random, Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>());
     const Eigen::Vector3f mf = m.cast<float>();
-    const float cost = kernel::cpu::patch_cost(fixture.context(), pixel, vec3(mf.x(), mf.y(), mf.z()));
+    const float cost =
+        kernel::cpu::patch_cost(fixture.context(), pixel, vec3(mf.x(), mf.y(), mf.z()));
     const double expected = literal_cost(fixture, reference, 1 - reference, pixel, m, 4, 0.6);
     if ((cost >= 2) != (expected >= 2)) {
       ++validity_differs;
@@ -144,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{PatchWarp::affine, 0, 0.2}, Case{PatchWarp::quadratic, 0, 0.03}));
 
 TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
-  for (const auto [warp, median_limit, p95_limit] :
+  for (const auto& [warp, median_limit, p95_limit] :
        {std::tuple{PatchWarp::affine, 0.02, 0.08}, {PatchWarp::quadratic, 0.002, 0.01}}) {
     Options options;
     options.window_radius = 5;
@@ -161,11 +163,13 @@ TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
       const cv::Vec4f ray = fixture.view(0).rays(pixel.y, pixel.x);
       if (ray[3] == 0) continue;
       const Eigen::Vector3f m =
-          random_plane(random, Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>()).cast<float>();
+          random_plane(random, Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>())
+              .cast<float>();
       const vec3 mk(m.x(), m.y(), m.z());
       kernel::vec2 centre{};
       kernel::cpu::PatchMap map{};
-      if (!kernel::cpu::warp_pixel(context, pair, camera, camera.size.z, mk, pixel, centre)) continue;
+      if (!kernel::cpu::warp_pixel(context, pair, camera, camera.size.z, mk, pixel, centre))
+        continue;
       if (!kernel::cpu::map_patch(context, pair, camera, camera.size.z, mk, pixel, centre, map)) {
         continue;
       }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Plane algebra, random numbers and transfer of the shared kernel source against independent arithmetic.
+// Plane algebra, random numbers and transfer of the shared kernel source against independent
+// arithmetic.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -21,7 +22,8 @@ vec3 to_kernel(const Eigen::Vector3d& v) {
 TEST(Plane, HoldsTheGivenPointAndNormal) {
   const Eigen::Vector3d ray = Eigen::Vector3d(0.9, -0.2, -0.3).normalized();  // beyond 90 degrees
   const Eigen::Vector3d normal = Eigen::Vector3d(-0.7, 0.4, 0.5).normalized();
-  const Eigen::Vector3d m = to_eigen(kernel::cpu::plane_through(to_kernel(ray), 2.5f, to_kernel(normal)));
+  const Eigen::Vector3d m =
+      to_eigen(kernel::cpu::plane_through(to_kernel(ray), 2.5f, to_kernel(normal)));
   EXPECT_NEAR(m.dot(2.5 * ray), 1, 1e-6);
   EXPECT_NEAR(m.normalized().cross(normal).norm(), 0, 1e-6);
 }
@@ -39,8 +41,8 @@ TEST(Plane, MovesToTheSourceFrame) {
     EXPECT_NEAR(moved.dot(motion * point), 1, 1e-5);
   }
   const Eigen::Vector3d centre = motion.inverse().translation();
-  EXPECT_NEAR(static_cast<double>(kernel::cpu::side_of_source(pair, to_kernel(m))), 1 - m.dot(centre),
-              1e-6);
+  EXPECT_NEAR(static_cast<double>(kernel::cpu::side_of_source(pair, to_kernel(m))),
+              1 - m.dot(centre), 1e-6);
 }
 
 TEST(Random, IsUniformAndIndependentOfOrder) {
@@ -63,9 +65,12 @@ TEST(Random, IsUniformAndIndependentOfOrder) {
   EXPECT_NEAR(mean, 0.5, 0.005);
   EXPECT_NEAR(square, 1.0 / 3, 0.005);
   EXPECT_GT(distinct.size(), 4 * n * n * 0.98);
-  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x, kernel::cpu::random4(2, 0, ivec2(4, 5), 3, 5).x);
-  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x, kernel::cpu::random4(1, 1, ivec2(4, 5), 3, 5).x);
-  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x, kernel::cpu::random4(1, 0, ivec2(4, 5), 4, 5).x);
+  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x,
+            kernel::cpu::random4(2, 0, ivec2(4, 5), 3, 5).x);
+  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x,
+            kernel::cpu::random4(1, 1, ivec2(4, 5), 3, 5).x);
+  EXPECT_NE(kernel::cpu::random4(1, 0, ivec2(4, 5), 3, 5).x,
+            kernel::cpu::random4(1, 0, ivec2(4, 5), 4, 5).x);
 }
 
 TEST(Search, DrawsStayAdmissible) {
@@ -89,7 +94,8 @@ TEST(Search, DrawsStayAdmissible) {
         mean_distance += 1 / w;
         mean_inverse += w;
         ++n;
-        const vec3 near = kernel::cpu::perturbed_plane(fixture.context(), ivec2(x, y), ray, drawn, 1.0f, 4);
+        const vec3 near =
+            kernel::cpu::perturbed_plane(fixture.context(), ivec2(x, y), ray, drawn, 1.0f, 4);
         const double distance = 1 / static_cast<double>(dot(near, ray));
         ASSERT_GT(distance, 0.4999);
         ASSERT_LT(distance, 20.002);
@@ -115,7 +121,8 @@ TEST(Transfer, CarriesAPlaneIntoTheOtherView) {
       const cv::Vec4f ray = fixture.view(0).rays(y, x);
       const double w = m.dot(Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>());
       const vec3 mk = to_kernel(m);
-      fixture.view(0).hypotheses(y, x) = w > 0.02 ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
+      fixture.view(0).hypotheses(y, x) =
+          w > 0.02 ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
     }
   }
   fixture.set_reference(1);

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+#include <Eigen/Dense>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "calibration/formats.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace calibration {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Extra key of ours: half angles of the fields of view in degrees, one for each camera.
+constexpr const char* max_theta_key = "max_theta_deg";
+
+double number(const Document& document, const Json& object, const std::string& key) {
+  if (!object.is_object() || !object.contains(key) || !object.at(key).is_number()) {
+    document.fail("The number \"" + key + "\" is missing.");
+  }
+  return object.at(key).get<double>();
+}
+
+const Json& list(const Document& document, const Json& object, const char* key) {
+  if (!object.is_object() || !object.contains(key) || !object.at(key).is_array()) {
+    document.fail(std::string("The list \"") + key + "\" is missing.");
+  }
+  return object.at(key);
+}
+
+Camera read_camera(const Document& document, const Json& entry) {
+  if (!entry.is_object() || !entry.contains("camera_type") ||
+      !entry.at("camera_type").is_string() || !entry.contains("intrinsics")) {
+    document.fail("A camera lacks \"camera_type\" or \"intrinsics\".");
+  }
+  const std::string type = entry.at("camera_type").get<std::string>();
+  const Json& values = entry.at("intrinsics");
+  const auto value = [&](const char* key) { return number(document, values, key); };
+  Camera camera;
+  camera.fx = value("fx");
+  camera.fy = value("fy");
+  camera.cx = value("cx");
+  camera.cy = value("cy");
+  if (type == "ds") {
+    camera.model = CameraModel::double_sphere;
+    camera.xi = value("xi");
+    camera.alpha = value("alpha");
+  } else if (type == "eucm") {
+    camera.model = CameraModel::extended_unified;
+    camera.alpha = value("alpha");
+    camera.beta = value("beta");
+  } else if (type == "ucm") {
+    const double alpha = value("alpha");
+    if (!(alpha >= 0 && alpha < 1)) document.fail("The alpha of a ucm camera must lie in [0, 1).");
+    set_unified_from_alpha(camera, alpha);
+  } else if (type == "kb4") {
+    camera.model = CameraModel::kannala_brandt;
+    camera.k1 = value("k1");
+    camera.k2 = value("k2");
+    camera.k3 = value("k3");
+    camera.k4 = value("k4");
+  } else if (type == "fov") {
+    camera.model = CameraModel::field_of_view;
+    camera.omega = value("w");
+  } else if (type == "pinhole") {
+    camera.model = CameraModel::pinhole;
+  } else {
+    document.fail("The camera_type \"" + type +
+                  "\" is unknown; use ds, eucm, ucm, kb4, fov or pinhole.");
+  }
+  return camera;
+}
+
+Eigen::Isometry3d read_pose(const Document& document, const Json& entry) {
+  const auto value = [&](const char* key) { return number(document, entry, key); };
+  const Eigen::Quaterniond q(value("qw"), value("qx"), value("qy"), value("qz"));
+  if (std::abs(q.norm() - 1) > 1e-3) {
+    document.fail("A quaternion of \"T_imu_cam\" does not have length 1.");
+  }
+  return rigid(document, "T_imu_cam", q.normalized().toRotationMatrix(),
+               {value("px"), value("py"), value("pz")});
+}
+
+int side(const Document& document, const Json& value) {
+  const double number = value.is_number() ? value.get<double>() : 0;
+  if (number < 1 || number > 1e6 || number != std::floor(number)) {
+    document.fail("\"resolution\" must hold pairs of whole numbers of pixels.");
+  }
+  return static_cast<int>(number);
+}
+
+Json basalt_form(const View& view, const std::filesystem::path& path) {
+  const Camera& c = view.camera;
+  const double f = c.model == CameraModel::unified ? 1 / (1 + c.xi) : 1;
+  Json values = {{"fx", c.fx * f}, {"fy", c.fy * f}, {"cx", c.cx}, {"cy", c.cy}};
+  std::string type;
+  switch (c.skew != 0 ? CameraModel::mei : c.model) {
+    case CameraModel::double_sphere:
+      type = "ds";
+      values["xi"] = c.xi;
+      values["alpha"] = c.alpha;
+      break;
+    case CameraModel::extended_unified:
+      type = "eucm";
+      values["alpha"] = c.alpha;
+      values["beta"] = c.beta;
+      break;
+    case CameraModel::unified:
+      type = "ucm";
+      values["alpha"] = unified_alpha(c);
+      break;
+    case CameraModel::kannala_brandt:
+      type = "kb4";
+      values["k1"] = c.k1;
+      values["k2"] = c.k2;
+      values["k3"] = c.k3;
+      values["k4"] = c.k4;
+      break;
+    case CameraModel::field_of_view:
+      type = "fov";
+      values["w"] = c.omega;
+      break;
+    case CameraModel::pinhole:
+      type = "pinhole";
+      break;
+    default:
+      throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
+                  (c.skew != 0 ? " with skew" : "") +
+                  ") has no form in Basalt's format; write Kalibr instead.");
+  }
+  return {{"camera_type", type}, {"intrinsics", values}};
+}
+
+}  // namespace
+
+Rig read_basalt(const Document& document) {
+  try {
+    const Json root = Json::parse(document.text);
+    if (!root.contains("value0")) {
+      document.fail("It has no \"value0\" as a Basalt calibration has; is it another JSON file?");
+    }
+    const Json& value = root.at("value0");
+    const Json& cameras = list(document, value, "intrinsics");
+    const Json& poses = list(document, value, "T_imu_cam");
+    const Json& sizes = list(document, value, "resolution");
+    if (cameras.empty() || cameras.size() != poses.size() || cameras.size() != sizes.size()) {
+      document.fail(
+          "\"intrinsics\", \"T_imu_cam\" and \"resolution\" must be lists of one length.");
+    }
+    Rig rig;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      View& view = rig.views.emplace_back();
+      view.name = "cam" + std::to_string(i);
+      view.camera = read_camera(document, cameras[i]);
+      if (!sizes[i].is_array() || sizes[i].size() != 2) {
+        document.fail("\"resolution\" must hold pairs of whole numbers of pixels.");
+      }
+      view.camera.width = side(document, sizes[i][0]);
+      view.camera.height = side(document, sizes[i][1]);
+      view.world_from_camera = read_pose(document, poses[i]);
+      if (value.contains(max_theta_key)) {
+        const Json& limits = list(document, value, max_theta_key);
+        if (limits.size() != cameras.size() || !limits[i].is_number()) {
+          document.fail("\"max_theta_deg\" must hold one number for each camera.");
+        }
+        view.camera.max_theta = limits[i].get<double>() * std::numbers::pi / 180;
+      }
+    }
+    const Eigen::Isometry3d first_from_rig = rig.views.front().world_from_camera.inverse();
+    for (View& view : rig.views) view.world_from_camera = first_from_rig * view.world_from_camera;
+    return rig;
+  } catch (const Json::exception& error) {
+    document.fail(std::string("It is not valid JSON of a Basalt calibration (") + error.what() +
+                  ").");
+  }
+}
+
+}  // namespace calibration
+
+void write_basalt(const std::filesystem::path& path, const Rig& rig) {
+  using calibration::Json;
+  Json value;
+  value["T_imu_cam"] = Json::array();
+  value["intrinsics"] = Json::array();
+  value["resolution"] = Json::array();
+  Json limits = Json::array();
+  bool limited = false;
+  for (const View& view : rig.views) {
+    const Eigen::Quaterniond q(view.world_from_camera.linear());
+    const Eigen::Vector3d p = view.world_from_camera.translation();
+    value["T_imu_cam"].push_back({{"px", p.x()},
+                                  {"py", p.y()},
+                                  {"pz", p.z()},
+                                  {"qx", q.x()},
+                                  {"qy", q.y()},
+                                  {"qz", q.z()},
+                                  {"qw", q.w()}});
+    value["intrinsics"].push_back(calibration::basalt_form(view, path));
+    value["resolution"].push_back({view.camera.width, view.camera.height});
+    limits.push_back(view.camera.max_theta * 180 / std::numbers::pi);
+    limited = limited || view.camera.max_theta < std::numbers::pi;
+  }
+  if (limited) value[calibration::max_theta_key] = limits;
+  write_text(path, Json{{"value0", value}}.dump(2) + "\n");
+}
+
+}  // namespace widestereo

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/epipolar.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+constexpr double ratio = 0.8;
+constexpr std::size_t fewest_matches = 8;
+constexpr double degrees = 180 / std::numbers::pi;
+
+struct Features {
+  std::vector<cv::KeyPoint> points;
+  cv::Mat descriptors;
+};
+
+/// SIFT on a contrast-equalised image, descriptors in Hellinger form (square roots of shares).
+Features detect(const cv::Mat& image, const std::string& name) {
+  cv::Mat grey;
+  to_intensity(image, name).convertTo(grey, CV_8U, 255);
+  cv::createCLAHE(3, {8, 8})->apply(grey, grey);
+  Features features;
+  cv::SIFT::create(6000)->detectAndCompute(grey, {}, features.points, features.descriptors);
+  for (int i = 0; i < features.descriptors.rows; ++i) {
+    cv::Mat row = features.descriptors.row(i);
+    row /= cv::norm(row, cv::NORM_L1) + 1e-9;
+    cv::sqrt(row, row);
+  }
+  return features;
+}
+
+/// For every descriptor of `a` its match in `b` or -1, by the ratio test.
+std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
+  std::vector<std::vector<cv::DMatch>> found;
+  cv::BFMatcher(cv::NORM_L2).knnMatch(a, b, found, 2);
+  std::vector<int> best(static_cast<std::size_t>(a.rows), -1);
+  for (const auto& pair : found) {
+    if (pair.size() == 2 &&
+        static_cast<double>(pair[0].distance) < ratio * static_cast<double>(pair[1].distance)) {
+      best[static_cast<std::size_t>(pair[0].queryIdx)] = pair[0].trainIdx;
+    }
+  }
+  return best;
+}
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto nth =
+      values.begin() + static_cast<long>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+/// Distance along the first ray to the point nearest to both rays, from the angles of the triangle.
+double triangulated_distance(const Eigen::Vector3d& ray, const Eigen::Vector3d& other,
+                             const Eigen::Vector3d& centre) {
+  const Eigen::Vector3d normal = ray.cross(other);
+  return centre.cross(other).dot(normal) / normal.squaredNorm();
+}
+
+}  // namespace
+
+std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& second) {
+  const Features a = detect(first, "The first image");
+  const Features b = detect(second, "The second image");
+  std::vector<PixelMatch> matches;
+  if (a.descriptors.rows < 2 || b.descriptors.rows < 2) return matches;
+  const std::vector<int> forward = best_matches(a.descriptors, b.descriptors);
+  const std::vector<int> backward = best_matches(b.descriptors, a.descriptors);
+  for (std::size_t i = 0; i < forward.size(); ++i) {
+    const int j = forward[i];
+    if (j < 0 || backward[static_cast<std::size_t>(j)] != static_cast<int>(i)) continue;
+    const cv::Point2d u = a.points[i].pt;
+    const cv::Point2d v = b.points[static_cast<std::size_t>(j)].pt;
+    matches.push_back({{u.x, u.y}, {v.x, v.y}});
+  }
+  return matches;
+}
+
+EpipolarReport check_epipolar(const View& first, const View& second,
+                              const std::vector<PixelMatch>& matches) {
+  const Eigen::Isometry3d motion = source_from_reference(second, first);
+  const Eigen::Vector3d epipole = motion.translation();
+  std::vector<double> pixels;
+  std::vector<double> angles;
+  std::vector<double> distances;
+  for (const PixelMatch& match : matches) {
+    Eigen::Vector3d ray_first;
+    Eigen::Vector3d ray_second;
+    if (!unproject(first.camera, match.first, ray_first) ||
+        !unproject(second.camera, match.second, ray_second)) {
+      continue;
+    }
+    const Eigen::Vector3d rotated = motion.linear() * ray_first;
+    const Eigen::Vector3d plane = epipole.cross(rotated).normalized();
+    if (!plane.allFinite()) continue;
+    const double offset = plane.dot(ray_second);
+    Eigen::Vector2d foot;
+    if (!project(second.camera, ray_second - offset * plane, foot)) continue;
+    pixels.push_back((foot - match.second).norm());
+    angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees);
+    const double parallax =
+        std::atan2(rotated.cross(ray_second).norm(), rotated.dot(ray_second)) * degrees;
+    if (pixels.back() >= 5 || parallax < 0.3) continue;
+    const Eigen::Vector3d other = motion.linear().transpose() * ray_second;
+    const Eigen::Vector3d centre = motion.inverse().translation();
+    const double distance = triangulated_distance(ray_first, other, centre);
+    if (distance > 0) distances.push_back(distance);
+  }
+  if (pixels.size() < fewest_matches) {
+    throw Error("Only " + std::to_string(pixels.size()) + " features match between " + first.name +
+                " and " + second.name +
+                "; the images need overlap, texture and the calibrated size to be checked.");
+  }
+  const auto share_below = [&](double limit) {
+    return static_cast<double>(std::count_if(pixels.begin(), pixels.end(),
+                                             [limit](double p) { return p < limit; })) /
+           static_cast<double>(pixels.size());
+  };
+  EpipolarReport report;
+  report.matches = static_cast<int>(pixels.size());
+  report.median_pixels = percentile(pixels, 0.5);
+  report.median_degrees = percentile(angles, 0.5);
+  report.below_1_pixel = share_below(1);
+  report.below_5_pixels = share_below(5);
+  report.nearest = percentile(distances, 0.05);
+  report.typical = percentile(distances, 0.5);
+  report.farthest = percentile(distances, 0.95);
+  return report;
+}
+
+}  // namespace widestereo

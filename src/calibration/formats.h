@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// One reader for each calibration format, told apart by content in read_calibration().
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "widestereo/calibration.h"
+
+namespace widestereo::calibration {
+
+/// A file being read: its content, and its name for messages.
+struct Document {
+  std::filesystem::path path;
+  std::string text;
+
+  /// Error whose message begins with the file's name.
+  [[noreturn]] void fail(const std::string& what) const;
+};
+
+Rig read_kalibr(const Document& document);
+Rig read_basalt(const Document& document);
+Rig read_opencv(const Document& document, cv::Size image_size);
+
+/// xi form of the unified model from the alpha form: xi = alpha / (1 - alpha), f_xi = f_alpha (1 +
+/// xi).
+void set_unified_from_alpha(Camera& camera, double alpha);
+/// alpha = xi / (1 + xi); the focal length of the alpha form is f_xi / (1 + xi).
+double unified_alpha(const Camera& camera);
+
+/// Rotation (nearly orthonormal by rounding) and translation as a rigid motion; fails when it is
+/// not one.
+Eigen::Isometry3d rigid(const Document& document, const std::string& what,
+                        const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
+
+}  // namespace widestereo::calibration

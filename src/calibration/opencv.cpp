@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+#include <Eigen/Dense>
+#include <cmath>
+#include <initializer_list>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/core/persistence.hpp>
+
+#include "calibration/formats.h"
+
+namespace widestereo::calibration {
+namespace {
+
+using Keys = std::initializer_list<const char*>;
+
+/// A FileStorage whose keys go by several names.
+class Storage {
+ public:
+  explicit Storage(const Document& document)
+      : document_(document), file_(document.text, cv::FileStorage::READ | cv::FileStorage::MEMORY) {
+    if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
+  }
+
+  /// The first of the keys that holds a numeric matrix (or a number), as double; empty if none
+  /// does.
+  cv::Mat matrix(Keys keys) const {
+    for (const char* key : keys) {
+      const cv::FileNode node = file_[key];
+      cv::Mat value;
+      if (node.isReal() || node.isInt()) return cv::Mat(1, 1, CV_64F, cv::Scalar(node.real()));
+      if (!node.isMap()) continue;
+      node >> value;
+      if (value.empty() || value.channels() != 1) continue;
+      value.convertTo(value, CV_64F);
+      if (!cv::checkRange(value)) {
+        document_.fail(std::string("The matrix ") + key + " holds a number that is not finite.");
+      }
+      return value.reshape(1, value.rows);
+    }
+    return {};
+  }
+
+  cv::Mat required(Keys keys, int elements, const char* what) const {
+    cv::Mat value = matrix(keys);
+    if (value.empty() || static_cast<int>(value.total()) < elements) {
+      document_.fail(std::string("The ") + what + " (" + *keys.begin() + ", at least " +
+                     std::to_string(elements) + " numbers) is missing.");
+    }
+    return value;
+  }
+
+  cv::Size image_size() const {
+    const cv::Mat both = matrix({"image_size", "imageSize", "img_size"});
+    const cv::Mat width = matrix({"image_width", "width", "image_Width"});
+    const cv::Mat height = matrix({"image_height", "height", "image_Height"});
+    if (both.total() == 2) return size_of(both.at<double>(0), both.at<double>(1));
+    if (!width.empty() && !height.empty()) {
+      return size_of(width.at<double>(0), height.at<double>(0));
+    }
+    const cv::FileNode list = file_["image_size"];
+    if (list.isSeq() && list.size() == 2) return size_of(list[0].real(), list[1].real());
+    return {};
+  }
+
+ private:
+  cv::Size size_of(double width, double height) const {
+    if (!(width >= 1 && height >= 1 && width <= 1e6 && height <= 1e6)) {
+      document_.fail("The image size is not a pair of whole numbers of pixels.");
+    }
+    return {static_cast<int>(width), static_cast<int>(height)};
+  }
+
+  const Document& document_;
+  cv::FileStorage file_;
+};
+
+/// One camera's keys.
+struct CameraKeys {
+  Keys k, d, xi;
+};
+
+constexpr int kannala_brandt_coefficients = 4;
+
+Camera read_camera(const Storage& storage, const CameraKeys& keys, cv::Size size) {
+  const cv::Mat k =
+      storage.required(keys.k, 9, "camera matrix").reshape(1, 1).colRange(0, 9).reshape(1, 3);
+  const cv::Mat d = storage.required(keys.d, kannala_brandt_coefficients, "distortion");
+  const cv::Mat xi = storage.matrix(keys.xi);
+  Camera camera;
+  camera.width = size.width;
+  camera.height = size.height;
+  camera.fx = k.at<double>(0, 0);
+  camera.skew = k.at<double>(0, 1);
+  camera.cx = k.at<double>(0, 2);
+  camera.fy = k.at<double>(1, 1);
+  camera.cy = k.at<double>(1, 2);
+  const cv::Mat_<double> c = d.reshape(1, 1);
+  camera.k1 = c(0);
+  camera.k2 = c(1);
+  if (!xi.empty()) {
+    camera.model = CameraModel::mei;
+    camera.xi = xi.at<double>(0);
+    camera.p1 = c(2);
+    camera.p2 = c(3);
+  } else if (c.cols == kannala_brandt_coefficients) {
+    // cv::fisheye: four radial coefficients. Files of cv::stereoCalibrate have five or more.
+    camera.model = CameraModel::kannala_brandt;
+    camera.k3 = c(2);
+    camera.k4 = c(3);
+  } else {
+    camera.model = CameraModel::pinhole_radtan;
+    camera.p1 = c(2);
+    camera.p2 = c(3);
+    camera.k3 = c(4);
+  }
+  return camera;
+}
+
+Eigen::Isometry3d second_from_first(const Storage& storage, const Document& document) {
+  cv::Mat rotation = storage.matrix({"R", "rotation", "R_stereo"});
+  if (rotation.empty()) {
+    const cv::Mat vector = storage.required({"rvec", "om"}, 3, "rotation");
+    cv::Rodrigues(vector.reshape(1, 1).colRange(0, 3).reshape(1, 3), rotation);
+  }
+  if (rotation.total() == 3) cv::Rodrigues(rotation.clone().reshape(1, 3), rotation);
+  const cv::Mat translation = storage.required({"T", "t", "tvec", "translation"}, 3, "translation");
+  if (rotation.rows != 3 || rotation.cols != 3) document.fail("The rotation R must be 3x3.");
+  Eigen::Matrix3d r;
+  cv::cv2eigen(rotation, r);
+  const cv::Mat_<double> t = translation.reshape(1, 1);
+  return rigid(document, "R and T", r, {t(0), t(1), t(2)});
+}
+
+}  // namespace
+
+Rig read_opencv(const Document& document, cv::Size image_size) {
+  try {
+    const Storage storage(document);
+    const cv::Size in_file = storage.image_size();
+    const cv::Size size = in_file.empty() ? image_size : in_file;
+    if (size.empty()) {
+      document.fail(
+          "It holds no image size; add image_width and image_height, or give the images.");
+    }
+    if (!in_file.empty() && !image_size.empty() && in_file != image_size) {
+      document.fail("It is for images of " + std::to_string(in_file.width) + "x" +
+                    std::to_string(in_file.height) + " pixels, the given ones have " +
+                    std::to_string(image_size.width) + "x" + std::to_string(image_size.height) +
+                    ".");
+    }
+    Rig rig;
+    rig.views.resize(2);
+    rig.views[0].name = "cam0";
+    rig.views[1].name = "cam1";
+    rig.views[0].camera = read_camera(storage,
+                                      {{"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
+                                        "camera_matrix_left", "K", "camera_matrix"},
+                                       {"D1", "distCoeffs1", "dist_coeffs_1", "D_left",
+                                        "distortion_left", "D", "distortion_coefficients"},
+                                       {"xi1", "xi_left", "xi"}},
+                                      size);
+    const bool single = storage
+                            .matrix({"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right",
+                                     "camera_matrix_right"})
+                            .empty();
+    if (single) {
+      rig.views.pop_back();
+      return rig;
+    }
+    rig.views[1].camera = read_camera(
+        storage,
+        {{"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
+         {"D2", "distCoeffs2", "dist_coeffs_2", "D_right", "distortion_right"},
+         {"xi2", "xi_right"}},
+        size);
+    rig.views[1].world_from_camera = second_from_first(storage, document).inverse();
+    return rig;
+  } catch (const cv::Exception& error) {
+    document.fail("OpenCV cannot read it (" + error.err + ").");
+  }
+}
+
+}  // namespace widestereo::calibration

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+#include <Eigen/Dense>
+#include <cctype>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "calibration/formats.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace calibration {
+
+void Document::fail(const std::string& what) const { throw Error(path.string() + ": " + what); }
+
+void set_unified_from_alpha(Camera& camera, double alpha) {
+  camera.model = CameraModel::unified;
+  camera.xi = alpha / (1 - alpha);
+  camera.fx *= 1 + camera.xi;
+  camera.fy *= 1 + camera.xi;
+}
+
+double unified_alpha(const Camera& camera) { return camera.xi / (1 + camera.xi); }
+
+Eigen::Isometry3d rigid(const Document& document, const std::string& what,
+                        const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
+  const bool orthonormal =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() < 1e-3 &&
+      rotation.determinant() > 0;
+  if (!rotation.allFinite() || !translation.allFinite() || !orthonormal) {
+    document.fail(what +
+                  " is not a rigid motion; its rotation must be orthonormal with determinant +1 "
+                  "and all numbers finite.");
+  }
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = rotation;
+  motion.translation() = translation;
+  return motion;
+}
+
+namespace {
+
+constexpr std::uintmax_t largest_file = 16 << 20;
+
+Document load(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    throw Error("There is no calibration file " + path.string() + "; check the path.");
+  }
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw Error(path.string() + " is not a file; give a calibration file.");
+  }
+  if (std::filesystem::file_size(path, error) > largest_file) {
+    throw Error(path.string() + " is too large for a calibration file (16 MiB).");
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::stringstream text;
+  text << file.rdbuf();
+  if (!file) throw Error("Cannot read " + path.string() + "; check its permissions.");
+  return {path, text.str()};
+}
+
+bool contains(const Document& document, const char* text) {
+  return document.text.find(text) != std::string::npos;
+}
+
+CalibrationFormat format_of(const Document& document) {
+  const std::size_t first = document.text.find_first_not_of(" \t\r\n");
+  if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
+  if (contains(document, "opencv-matrix") || contains(document, "<opencv_storage")) {
+    return CalibrationFormat::opencv;
+  }
+  if (document.text[first] == '{') return CalibrationFormat::basalt;
+  if (contains(document, "camera_model") || contains(document, "cam0:")) {
+    return CalibrationFormat::kalibr;
+  }
+  document.fail(
+      "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
+      "(JSON) or an OpenCV FileStorage.");
+}
+
+}  // namespace
+}  // namespace calibration
+
+Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size) {
+  using namespace calibration;
+  const Document document = load(path);
+  Calibration result;
+  result.format = format_of(document);
+  switch (result.format) {
+    case CalibrationFormat::kalibr:
+      result.rig = read_kalibr(document);
+      break;
+    case CalibrationFormat::basalt:
+      result.rig = read_basalt(document);
+      break;
+    case CalibrationFormat::opencv:
+      result.rig = read_opencv(document, image_size);
+      break;
+  }
+  validate(result.rig, path.string());
+  return result;
+}
+
+}  // namespace widestereo

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "commands.h"
+#include "widestereo/calibration.h"
+#include "widestereo/epipolar.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace ws = widestereo;
+
+namespace {
+
+constexpr double degrees = 180 / std::numbers::pi;
+
+struct CalibrationArguments {
+  std::string file, output, format = "kalibr";
+  std::string left, right;
+  std::vector<int> views = {0, 1};
+  bool as_json = false;
+};
+
+const char* name_of(ws::CalibrationFormat format) {
+  switch (format) {
+    case ws::CalibrationFormat::kalibr:
+      return "Kalibr";
+    case ws::CalibrationFormat::basalt:
+      return "Basalt";
+    case ws::CalibrationFormat::opencv:
+      return "OpenCV";
+  }
+  return "";
+}
+
+/// Full angle between the outermost usable rays of a line of pixels through the image centre.
+double field_of_view(const ws::Camera& camera, const Eigen::Vector2d& direction) {
+  const Eigen::Vector2d centre(camera.cx, camera.cy);
+  double angle = 0;
+  for (const double sign : {-1.0, 1.0}) {
+    double reached = 0;
+    for (double step = 0; step < camera.width + camera.height; step += 1) {
+      const Eigen::Vector2d pixel = centre + sign * step * direction;
+      Eigen::Vector3d ray;
+      const bool inside = pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width - 1 &&
+                          pixel.y() <= camera.height - 1;
+      if (!inside || !unproject(camera, pixel, ray)) break;
+      reached = std::atan2(ray.head<2>().norm(), ray.z());
+    }
+    angle += reached;
+  }
+  return angle * degrees;
+}
+
+nlohmann::ordered_json describe(const ws::View& view) {
+  const ws::Camera& c = view.camera;
+  const Eigen::Vector2d diagonal = Eigen::Vector2d(c.width, c.height).normalized();
+  return {{"name", view.name},
+          {"model", to_string(c.model)},
+          {"width", c.width},
+          {"height", c.height},
+          {"fx", c.fx},
+          {"fy", c.fy},
+          {"cx", c.cx},
+          {"cy", c.cy},
+          {"horizontal_field_of_view_degrees", field_of_view(c, Eigen::Vector2d::UnitX())},
+          {"vertical_field_of_view_degrees", field_of_view(c, Eigen::Vector2d::UnitY())},
+          {"diagonal_field_of_view_degrees", field_of_view(c, diagonal)},
+          {"model_max_theta_degrees", model_max_theta(c) * degrees},
+          {"max_theta_degrees", c.max_theta * degrees}};
+}
+
+nlohmann::ordered_json describe(const ws::View& first, const ws::View& second) {
+  const Eigen::Isometry3d motion = source_from_reference(second, first);
+  const Eigen::Vector3d centre = motion.inverse().translation();
+  const Eigen::Vector3d direction = centre.normalized();
+  return {{"first", first.name},
+          {"second", second.name},
+          {"baseline_metres", centre.norm()},
+          {"rotation_degrees", Eigen::AngleAxisd(motion.linear()).angle() * degrees},
+          {"direction_in_first", {direction.x(), direction.y(), direction.z()}}};
+}
+
+void show(const CalibrationArguments& arguments) {
+  const ws::Calibration calibration = ws::read_calibration(arguments.file);
+  const std::vector<ws::View>& views = calibration.rig.views;
+  nlohmann::ordered_json json = {{"file", arguments.file}, {"format", name_of(calibration.format)}};
+  for (const ws::View& view : views) json["views"].push_back(describe(view));
+  json["pairs"] = nlohmann::json::array();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    for (std::size_t j = i + 1; j < views.size(); ++j) {
+      json["pairs"].push_back(describe(views[i], views[j]));
+    }
+  }
+  if (arguments.as_json) {
+    std::cout << json.dump(2) << "\n";
+    return;
+  }
+  std::printf("%s: %s\n", arguments.file.c_str(), name_of(calibration.format));
+  for (const auto& v : json["views"]) {
+    std::printf(
+        "  %s  %s  %d x %d px  f %.2f %.2f  c %.2f %.2f px\n"
+        "        field of view: horizontal %.1f, vertical %.1f, diagonal %.1f degrees; theta up to "
+        "%.1f (model), %.1f (lens)\n",
+        v["name"].get<std::string>().c_str(), v["model"].get<std::string>().c_str(),
+        v["width"].get<int>(), v["height"].get<int>(), v["fx"].get<double>(), v["fy"].get<double>(),
+        v["cx"].get<double>(), v["cy"].get<double>(),
+        v["horizontal_field_of_view_degrees"].get<double>(),
+        v["vertical_field_of_view_degrees"].get<double>(),
+        v["diagonal_field_of_view_degrees"].get<double>(),
+        v["model_max_theta_degrees"].get<double>(), v["max_theta_degrees"].get<double>());
+  }
+  for (const auto& p : json["pairs"]) {
+    std::printf("  %s - %s  baseline %.5f m  rotation %.3f degrees  direction %.3f %.3f %.3f\n",
+                p["first"].get<std::string>().c_str(), p["second"].get<std::string>().c_str(),
+                p["baseline_metres"].get<double>(), p["rotation_degrees"].get<double>(),
+                p["direction_in_first"][0].get<double>(), p["direction_in_first"][1].get<double>(),
+                p["direction_in_first"][2].get<double>());
+  }
+}
+
+void convert(const CalibrationArguments& arguments) {
+  const ws::Rig rig = ws::read_calibration(arguments.file).rig;
+  if (arguments.format == "kalibr") {
+    ws::write_kalibr(arguments.output, rig);
+  } else {
+    ws::write_basalt(arguments.output, rig);
+  }
+  std::cout << "Wrote " << arguments.output << "\n";
+}
+
+void check(const CalibrationArguments& arguments) {
+  const cv::Mat left = ws::read_image(arguments.left);
+  const cv::Mat right = ws::read_image(arguments.right);
+  const ws::Rig rig = ws::read_calibration(arguments.file, left.size()).rig;
+  const int count = static_cast<int>(rig.views.size());
+  for (const int view : arguments.views) {
+    if (view < 0 || view >= count) {
+      throw ws::Error(arguments.file + " has " + std::to_string(count) +
+                      " camera(s); there is no camera " + std::to_string(view) + ".");
+    }
+  }
+  const ws::View& first = rig.views[arguments.views[0]];
+  const ws::View& second = rig.views[arguments.views[1]];
+  for (const auto& [image, view] : {std::pair(&left, &first), std::pair(&right, &second)}) {
+    if (image->cols != view->camera.width || image->rows != view->camera.height) {
+      throw ws::Error("The image of " + view->name + " is " + std::to_string(image->cols) + "x" +
+                      std::to_string(image->rows) + " pixels, its calibration " +
+                      std::to_string(view->camera.width) + "x" +
+                      std::to_string(view->camera.height) + "; use images of the calibrated size.");
+    }
+  }
+  const ws::EpipolarReport r = check_epipolar(first, second, ws::match_features(left, right));
+  const char* verdict = r.median_pixels < 0.5   ? "good"
+                        : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"
+                                                : "too inaccurate for stereo: calibrate again";
+  if (arguments.as_json) {
+    std::cout << nlohmann::ordered_json({{"matches", r.matches},
+                                         {"median_pixels", r.median_pixels},
+                                         {"median_degrees", r.median_degrees},
+                                         {"below_1_pixel", r.below_1_pixel},
+                                         {"below_5_pixels", r.below_5_pixels},
+                                         {"distance_p5", r.nearest},
+                                         {"distance_p50", r.typical},
+                                         {"distance_p95", r.farthest},
+                                         {"verdict", verdict}})
+                     .dump(2)
+              << "\n";
+    return;
+  }
+  std::printf(
+      "%d matched features\n"
+      "epipolar error: median %.2f px, %.3f degrees; %.0f %% below 1 px, %.0f %% below 5 px\n"
+      "distances: 5 %% below %.2f m, half below %.2f m, 95 %% below %.2f m\n"
+      "calibration: %s\n",
+      r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
+      r.nearest, r.typical, r.farthest, verdict);
+}
+
+}  // namespace
+
+void add_calibration_command(CLI::App& app) {
+  CLI::App* group = app.add_subcommand("calibration", "Show, convert or check calibration files");
+  group->require_subcommand(1);
+  auto arguments = std::make_shared<CalibrationArguments>();
+
+  CLI::App* show_command =
+      group->add_subcommand("show", "Print models, fields of view, baselines and rotations");
+  show_command->add_option("file", arguments->file, "Kalibr, Basalt or OpenCV file")->required();
+  show_command->add_flag("--json", arguments->as_json, "Print JSON");
+  show_command->callback([arguments] { show(*arguments); });
+
+  CLI::App* convert_command = group->add_subcommand("convert", "Write another format");
+  convert_command->add_option("input", arguments->file, "Kalibr, Basalt or OpenCV file")
+      ->required();
+  convert_command->add_option("output", arguments->output, "File to write")->required();
+  convert_command->add_option("--to", arguments->format, "kalibr or basalt")
+      ->check(CLI::IsMember({"kalibr", "basalt"}))
+      ->capture_default_str();
+  convert_command->callback([arguments] { convert(*arguments); });
+
+  CLI::App* check_command = group->add_subcommand(
+      "check", "Measure the epipolar error of features matched between two images");
+  check_command->add_option("left", arguments->left, "Image of the first camera")->required();
+  check_command->add_option("right", arguments->right, "Image of the second camera")->required();
+  check_command->add_option("-c,--calibration", arguments->file, "Calibration file")->required();
+  check_command->add_option("--views", arguments->views, "The two cameras")
+      ->delimiter(',')
+      ->expected(2)
+      ->capture_default_str();
+  check_command->add_flag("--json", arguments->as_json, "Print JSON");
+  check_command->callback([arguments] { check(*arguments); });
+}

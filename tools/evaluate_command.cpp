@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "commands.h"
+#include "widestereo/calibration.h"
+#include "widestereo/error.h"
+#include "widestereo/evaluation.h"
+#include "widestereo/image_io.h"
+
+namespace ws = widestereo;
+namespace fs = std::filesystem;
+
+namespace {
+
+struct EvaluateArguments {
+  std::string prediction, normals;
+  std::string set;
+  std::string truth, valid, occlusion, truth_normals, calibration;
+  int view = 0, source = 1;
+  std::string error_map;
+  bool as_json = false;
+};
+
+cv::Mat read_mask(const fs::path& path) {
+  const cv::Mat image = ws::read_image(path);
+  if (image.type() != CV_8UC1) throw ws::Error(path.string() + " is not an 8-bit grey mask.");
+  return image;
+}
+
+/// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),
+/// normalN.tiff and calib.yaml.
+void take_from_set(EvaluateArguments& a) {
+  const fs::path folder = a.set;
+  if (!fs::is_directory(folder))
+    throw ws::Error("There is no folder " + a.set + "; check the path.");
+  const std::string n = std::to_string(a.view);
+  const auto take = [&](std::string& target, const std::string& name) {
+    if (target.empty() && fs::exists(folder / name)) target = (folder / name).string();
+  };
+  take(a.truth, "depth" + n + ".tiff");
+  take(a.valid, "valid" + n + ".png");
+  take(a.occlusion, "occ" + n + "_" + std::to_string(a.source) + ".png");
+  take(a.occlusion, "occ" + n + ".png");
+  take(a.truth_normals, "normal" + n + ".tiff");
+  take(a.calibration, "calib.yaml");
+}
+
+void run_evaluate(EvaluateArguments a) {
+  if (!a.set.empty()) take_from_set(a);
+  if (a.truth.empty() || a.calibration.empty()) {
+    throw ws::Error("Give --truth and --calibration, or a folder with both by --set.");
+  }
+  ws::GroundTruth truth;
+  truth.distance = ws::read_map(a.truth);
+  if (!a.valid.empty()) truth.valid = read_mask(a.valid);
+  if (!a.occlusion.empty()) truth.occlusion = read_mask(a.occlusion);
+  if (!a.truth_normals.empty()) truth.normals = ws::read_map(a.truth_normals);
+  const cv::Mat prediction = ws::read_map(a.prediction);
+  const cv::Mat normals = a.normals.empty() ? cv::Mat() : ws::read_map(a.normals);
+  const ws::Rig rig = ws::read_calibration(a.calibration, prediction.size()).rig;
+  const int views = static_cast<int>(rig.views.size());
+  if (a.view < 0 || a.view >= views || a.source < 0 || a.source >= views || a.view == a.source) {
+    throw ws::Error(a.calibration + " has " + std::to_string(views) +
+                    " camera(s); choose two different ones by --view and --source.");
+  }
+  const std::vector<ws::RegionScores> scores =
+      ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
+  std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
+  if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
+}
+
+}  // namespace
+
+void add_evaluate_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("evaluate", "Score a distance map against ground truth");
+  auto a = std::make_shared<EvaluateArguments>();
+  command->add_option("prediction", a->prediction, "Distance map: .tiff, .pfm or 16-bit .png in mm")
+      ->required();
+  command->add_option("--normals", a->normals, "Normal map to score as well");
+  command->add_option("--set", a->set, "Folder with depthN.tiff, validN.png, occN.png, calib.yaml");
+  command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
+  command->add_option("--valid", a->valid, "Mask, 0 = do not score");
+  command->add_option("--occlusion", a->occlusion,
+                      "255 visible in the source, 0 occluded, 128 outside");
+  command->add_option("--truth-normals", a->truth_normals, "Ground truth of the normals");
+  command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
+  command->add_option("--view", a->view, "Camera of the distance map")->capture_default_str();
+  command->add_option("--source", a->source, "Camera in which displacements are measured")
+      ->capture_default_str();
+  command->add_option("--error-map", a->error_map, "Write a picture of the relative error");
+  command->add_flag("--json", a->as_json, "Print JSON");
+  command->callback([a] { run_evaluate(*a); });
+}

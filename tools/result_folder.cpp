@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: MIT
+#include "result_folder.h"
+
+#include <cstdio>
+#include <iostream>
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "widestereo/image_io.h"
+#include "widestereo/pictures.h"
+#include "widestereo/point_cloud.h"
+
+namespace ws = widestereo;
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+/// Writes the files of one view and notes their names.
+class ViewWriter {
+ public:
+  ViewWriter(fs::path folder, const FolderContents& contents, const FolderFormat& format, int index)
+      : folder_(std::move(folder)),
+        contents_(contents),
+        format_(format),
+        index_(index),
+        view_(contents.rig.views[index]),
+        result_(contents.run.result.views[index]),
+        accepted_(ws::accepted_distance(result_)) {}
+
+  Json write() {
+    write_maps();
+    if (!format_.no_cloud) write_cloud();
+    if (!format_.no_pictures) write_pictures();
+    const ws::ConsistencyScores scores = ws::consistency_scores(result_.differences, result_.cost);
+    const double usable = cv::countNonZero((result_.reasons & ws::reason_no_ray) == 0);
+    return {{"name", view_.name},
+            {"model", to_string(view_.camera.model)},
+            {"width", view_.camera.width},
+            {"height", view_.camera.height},
+            {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
+            {"accepted", cv::countNonZero(accepted_) / std::max(usable, 1.0)},
+            {"mean_cost", scores.mean_cost},
+            {"cost_below_0.2", scores.low_cost},
+            {"consistent_within_2_percent", scores.consistent_relative},
+            {"consistent_within_2_pixels", scores.consistent_pixels},
+            {"files", files_}};
+  }
+
+ private:
+  fs::path named(const std::string& what, const std::string& extension) {
+    const std::string name = what + std::to_string(index_) + extension;
+    files_[what + extension] = name;
+    return folder_ / name;
+  }
+
+  void write_maps() {
+    for (const std::string& extension : format_.maps) {
+      ws::write_map(named("distance", "." + extension), result_.distance, format_.png_scale);
+      ws::write_map(named("distance_accepted", "." + extension), accepted_, format_.png_scale);
+    }
+    ws::write_map(named("normals", ".tiff"), result_.normals);
+    ws::write_map(named("cost", ".tiff"), result_.cost);
+    ws::write_map(named("confidence", ".tiff"), result_.confidence);
+    ws::write_image(named("reasons", ".png"), result_.reasons);
+  }
+
+  void write_cloud() {
+    const cv::Mat rays = ws::ray_image(view_.camera, view_.mask);
+    ws::write_ply(named("cloud", ".ply"),
+                  ws::make_point_cloud(accepted_, rays, result_.normals, contents_.images[index_],
+                                       result_.confidence, view_.world_from_camera));
+  }
+
+  void write_pictures() {
+    const cv::Mat& image = contents_.images[index_];
+    const bool has_truth = !contents_.truths.empty();
+    const ws::ColourRange range =
+        ws::robust_range(has_truth ? contents_.truths[index_].distance : accepted_);
+    const auto distances = [&range](const cv::Mat& map) {
+      return ws::with_distance_legend(ws::distance_picture(map, range), range);
+    };
+    const cv::Mat accepted = distances(accepted_);
+    const cv::Mat normals = ws::normal_picture(result_.normals);
+    const cv::Mat confidence =
+        ws::with_scalar_legend(ws::scalar_picture(result_.confidence, 0, 1), 0, 1);
+    const cv::Mat reasons = ws::with_reason_legend(ws::reason_picture(result_.reasons, image));
+    ws::write_image(named("distance_preview", ".png"), accepted);
+    ws::write_image(named("normals_preview", ".png"), normals);
+    ws::write_image(named("confidence_preview", ".png"), confidence);
+    ws::write_image(named("reasons_preview", ".png"), reasons);
+    std::vector<ws::Panel> panels = {{"image", image},
+                                     {"distance", distances(result_.distance)},
+                                     {"accepted distance", accepted},
+                                     {"normals", normals},
+                                     {"confidence", confidence},
+                                     {"rejected because", reasons}};
+    if (has_truth) {
+      const ws::GroundTruth& truth = contents_.truths[index_];
+      panels.push_back({"true distance", distances(truth.distance)});
+      panels.push_back({"error: green 0.5 %, red 5 %", ws::error_picture(result_.distance, truth)});
+    }
+    ws::write_image(named("summary", ".png"), ws::panel_sheet(panels, has_truth ? 4 : 3));
+  }
+
+  fs::path folder_;
+  const FolderContents& contents_;
+  const FolderFormat& format_;
+  int index_;
+  const ws::View& view_;
+  const ws::ViewResult& result_;
+  cv::Mat accepted_;
+  Json files_;
+};
+
+Json record_of(const FolderContents& contents, const FolderFormat& format) {
+  const MatchingRun& run = contents.run;
+  Json record = {{"program", "widestereo " WIDESTEREO_VERSION}};
+  record["input"] = contents.origin;
+  record["device"] = {{"id", run.device.id},     {"name", run.device.name},
+                      {"type", run.device.type}, {"driver", run.device.driver},
+                      {"uuid", run.device.uuid}, {"bytes", run.result.device_bytes}};
+  record["options"] = Json::parse(ws::to_json(run.options));
+  record["milliseconds"] = run.result.milliseconds;
+  for (const ws::KernelTime& time : run.result.times) {
+    record["kernels"].push_back({{"kernel", time.kernel},
+                                 {"dispatches", time.dispatches},
+                                 {"milliseconds", time.milliseconds}});
+  }
+  record["patch_samples"] = run.result.samples;
+  record["conventions"] = {
+      {"distance", "metres along the unit viewing ray through the pixel centre; 0 = no value"},
+      {"distance_png", "16 bit, " + Json(format.png_scale).dump() + " units per metre"},
+      {"distance_accepted", "distance, 0 where reasons is not 0"},
+      {"normals",
+       "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
+      {"cost", "1 - ZNCC in [0, 2]; 2 = no plane, 1 = no texture"},
+      {"confidence", "[0, 1], 0 where rejected"},
+      {"reasons",
+       "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
+       "32 unchecked, 64 low parallax, 128 tilt; 0 = accepted"},
+      {"cloud", "world frame, metres, accepted pixels"},
+      {"pixels", "integer coordinates are pixel centres"}};
+  return record;
+}
+
+}  // namespace
+
+void FolderFormat::add_to(CLI::App& command) {
+  const std::string output = "Output";
+  command.add_option("--formats", maps, "Distance maps: tiff, pfm, png (several by comma)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"tiff", "pfm", "png"}))
+      ->capture_default_str()
+      ->group(output);
+  command.add_option("--png-scale", png_scale, "Units per metre of 16-bit PNG distances")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->group(output);
+  command.add_flag("--no-cloud", no_cloud, "Do not write point clouds")->group(output);
+  command.add_flag("--no-pictures", no_pictures, "Do not write preview pictures")->group(output);
+}
+
+Json write_result_folder(const fs::path& folder, const FolderContents& contents,
+                         const FolderFormat& format) {
+  Json record = record_of(contents, format);
+  for (std::size_t i = 0; i < contents.rig.views.size(); ++i) {
+    record["views"].push_back(ViewWriter(folder, contents, format, static_cast<int>(i)).write());
+  }
+  if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
+  ws::write_text(folder / "result.json", record.dump(2) + "\n");
+  return record;
+}
+
+void report(const Json& record, const fs::path& folder, bool as_json) {
+  if (as_json) {
+    std::cout << record.dump(2) << "\n";
+    return;
+  }
+  std::printf("%s: %.2f s, %.0f million patch samples (preset %s)\n",
+              record["device"]["name"].get<std::string>().c_str(),
+              record["milliseconds"].get<double>() / 1000,
+              record["patch_samples"].get<double>() / 1e6,
+              record["options"]["preset"].get<std::string>().c_str());
+  for (const auto& view : record["views"]) {
+    std::printf(
+        "%s: %.1f %% accepted, mean cost %.3f, cost < 0.2 %.1f %%, left-right within 2 %% %.1f %%, "
+        "within "
+        "2 px %.1f %%\n",
+        view["name"].get<std::string>().c_str(), 100 * view["accepted"].get<double>(),
+        view["mean_cost"].get<double>(), 100 * view["cost_below_0.2"].get<double>(),
+        100 * view["consistent_within_2_percent"].get<double>(),
+        100 * view["consistent_within_2_pixels"].get<double>());
+  }
+  std::printf("Results are in %s\n", folder.string().c_str());
+}
