@@ -53,14 +53,14 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
          t2 * (camera.shape.x +
                t2 * (camera.shape.y + t2 * (camera.shape.z + t2 * camera.shape.w))));
     inside = inside && theta < camera.domain.y;
-    real scale = rho > real(0) ? distorted / rho : real(0);
+    real scale = rho > real(0) ? distorted / rho : real(1) / point.z;
     x = point.x * scale;
     y = point.y * scale;
   } else if (model == CAMERA_FIELD_OF_VIEW) {
     real rho = sqrt(rho2);
     real distorted = atan(rho * camera.shape.y, point.z) / camera.shape.x;
     inside = inside && (rho > real(0) || point.z > real(0));
-    real scale = rho > real(0) ? distorted / rho : real(0);
+    real scale = rho > real(0) ? distorted / rho : camera.shape.y / (camera.shape.x * point.z);
     x = point.x * scale;
     y = point.y * scale;
   } else {

@@ -80,13 +80,13 @@ double kannala_brandt_theta(const kernel::precise::CameraParameters& p, double r
   return increasing_root(value_and_slope, 0, limit, r);
 }
 
-/// The undistorted point whose Brown-Conrady distortion is m; false outside the increasing part.
-bool undistort(const kernel::precise::CameraParameters& p, const Vector2d& m,
-               Vector2d& undistorted) {
+/// Inverts the Brown-Conrady distortion of a point in place; false outside the increasing part.
+bool undistort(const kernel::precise::CameraParameters& p, Vector2d& point) {
   // The radial part alone brackets the radius; Newton in two dimensions adds the tangential part.
   const double k1 = p.distortion.x;
   const double k2 = p.distortion.y;
   const double k3 = p.domain.w;
+  const Vector2d m = point;
   const double norm = m.norm();
   const auto value_and_slope = [&](double r) {
     const double q = r * r;
@@ -97,28 +97,28 @@ bool undistort(const kernel::precise::CameraParameters& p, const Vector2d& m,
   double high = std::min(largest, std::max(1.0, 2 * norm));
   while (high < largest && value_and_slope(high).first < 0) high = std::min(largest, 2 * high);
   const double radius = increasing_root(value_and_slope, 0, high, norm);
-  undistorted = norm > 0 ? Vector2d(m * (radius / norm)) : Vector2d::Zero();
+  if (norm > 0) point = m * (radius / norm);
 
   const kernel::dual::CameraParameters dual = constant(p);
   for (int i = 0; i < 30; ++i) {
-    const Dual x(undistorted.x(), Eigen::RowVector3d::UnitX());
-    const Dual y(undistorted.y(), Eigen::RowVector3d::UnitY());
+    const Dual x(point.x(), Eigen::RowVector3d::UnitX());
+    const Dual y(point.y(), Eigen::RowVector3d::UnitY());
     const kernel::dual::real2 d = kernel::dual::distort(dual, x, y, x * x + y * y);
     Eigen::Matrix2d jacobian;
     jacobian << d.x.derivative.head<2>(), d.y.derivative.head<2>();
     const Vector2d step = jacobian.inverse() * (m - Vector2d(d.x.value, d.y.value));
     if (!step.allFinite()) return false;
-    undistorted += step;
-    if (step.norm() <= 1e-15 * (1 + undistorted.norm())) break;
+    point += step;
+    if (step.norm() <= 1e-15 * (1 + point.norm())) break;
   }
-  return undistorted.squaredNorm() < p.domain.y;
+  return point.squaredNorm() < p.domain.y;
 }
 
 /// Direction (any length) of a point on the model's normalised plane, before checking the domain.
 bool direction_of(const Camera& c, const kernel::precise::CameraParameters& p, Vector2d m,
                   Vector3d& direction) {
   if (c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei) {
-    if (!undistort(p, m, m)) return false;
+    if (!undistort(p, m)) return false;
   }
   const double r2 = m.squaredNorm();
   const double r = std::sqrt(r2);

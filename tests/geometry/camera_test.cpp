@@ -1,0 +1,444 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/camera.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/ccalib/omnidir.hpp>
+#include <random>
+
+#include "geometry/camera_parameters.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+constexpr double degree = std::numbers::pi / 180;
+
+struct NamedCamera {
+  const char* name;
+  Camera camera;
+};
+
+Camera make(CameraModel model, int width, int height, double fx, double fy, double cx, double cy) {
+  Camera camera;
+  camera.model = model;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = fx;
+  camera.fy = fy;
+  camera.cx = cx;
+  camera.cy = cy;
+  return camera;
+}
+
+/// Published calibrations of real lenses, and the corners of the parameter ranges.
+std::vector<NamedCamera> cameras() {
+  std::vector<NamedCamera> list;
+  list.push_back({"pinhole", make(CameraModel::pinhole, 640, 480, 400, 401, 320.5, 239)});
+
+  Camera c = make(CameraModel::pinhole_radtan, 752, 480, 458.654, 457.296, 367.215, 248.375);
+  c.k1 = -0.28340811;
+  c.k2 = 0.07395907;
+  c.p1 = 0.00019359;
+  c.p2 = 1.76187114e-05;
+  list.push_back({"euroc_radtan", c});
+  c.k3 = 0.01;
+  c.k1 = 0.1;
+  list.push_back({"barrel_radtan_k3", c});
+
+  c = make(CameraModel::kannala_brandt, 512, 512, 190.978, 190.973, 254.932, 256.897);
+  c.k1 = 0.0034823894;
+  c.k2 = 0.000715034845;
+  c.k3 = -0.0020532361;
+  c.k4 = 0.00020293673;
+  list.push_back({"tumvi_kb4", c});
+  c = make(CameraModel::kannala_brandt, 848, 800, 285.722, 286.759, 420.135, 403.394);
+  c.k1 = -0.00659769;
+  c.k2 = 0.0473251;
+  c.k3 = -0.0458264;
+  c.k4 = 0.00897725;
+  list.push_back({"t265_kb4", c});
+  c.skew = 0.39;
+  list.push_back({"t265_kb4_skew", c});
+
+  c = make(CameraModel::double_sphere, 512, 512, 158.286, 158.274, 254.961, 256.889);
+  c.xi = -0.17213086;
+  c.alpha = 0.59311776;
+  list.push_back({"tumvi_ds", c});
+  c = make(CameraModel::double_sphere, 1216, 1216, 451, 451, 608, 607);
+  c.xi = 0.46;
+  c.alpha = 0.77;
+  list.push_back({"sphere_stereo_ds", c});
+  c.xi = 0.9;
+  c.alpha = 0.6;
+  list.push_back({"wide_ds", c});
+  c.xi = 0.2;
+  c.alpha = 0.4;
+  list.push_back({"small_alpha_ds", c});
+
+  c = make(CameraModel::unified, 1024, 1024, 450, 449.6, 513.7, 509.2);
+  c.xi = 0.9;
+  list.push_back({"omni", c});
+  c.xi = 2.2;
+  c.fx = c.fy = 1336;
+  list.push_back({"omni_xi_above_1", c});
+  c.xi = 0;
+  list.push_back({"omni_as_pinhole", c});
+
+  c = make(CameraModel::extended_unified, 512, 512, 190.9, 190.8, 254.9, 256.9);
+  c.alpha = 0.6299;
+  c.beta = 1.0420;
+  list.push_back({"tumvi_eucm", c});
+  c.alpha = 0.4;
+  c.beta = 0.8;
+  list.push_back({"small_alpha_eucm", c});
+
+  c = make(CameraModel::field_of_view, 640, 480, 250, 251, 319, 241);
+  c.omega = 0.93;
+  list.push_back({"fov", c});
+  c.omega = 2.4;
+  list.push_back({"wide_fov", c});
+
+  c = make(CameraModel::mei, 1280, 800, 895.548, 894.744, 649.624, 398.719);
+  c.xi = 1.15844;
+  c.k1 = -0.33084335;
+  c.k2 = 0.08651983;
+  c.p1 = -0.000676787;
+  c.p2 = -3.6413e-05;
+  list.push_back({"psl_mei", c});
+  c = make(CameraModel::mei, 1400, 1400, 1336.3, 1335.8, 716.94, 705.76);
+  c.xi = 2.2134;
+  c.k1 = 0.016798;
+  c.k2 = 1.65475;
+  c.p1 = 0.00042223;
+  c.p2 = 0.00042462;
+  list.push_back({"kitti360_mei", c});
+  return list;
+}
+
+Vector3d direction(double theta, double azimuth) {
+  return {std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth),
+          std::cos(theta)};
+}
+
+class EveryCamera : public ::testing::TestWithParam<NamedCamera> {};
+
+TEST_P(EveryCamera, RoundTripOverTheWholeDomain) {
+  const Camera& camera = GetParam().camera;
+  validate(camera, "test");
+  const double limit = model_max_theta(camera);
+  // Near the limit the projection flattens and the inverse loses digits: stay a little inside.
+  const double reach = std::min(limit, std::numbers::pi - 1e-6) * 0.995;
+  int checked = 0;
+  for (int i = 0; i <= 200; ++i) {
+    for (int j = 0; j < 24; ++j) {
+      const Vector3d expected = direction(reach * i / 200, j * 15 * degree + 0.01);
+      Vector2d pixel;
+      ASSERT_TRUE(project(camera, 3.7 * expected, pixel));
+      if (pixel.norm() > 1e5) continue;  // a pinhole near 90 degrees
+      Vector3d ray;
+      // The tangential terms of radtan move the fold a little; only the innermost part is
+      // guaranteed.
+      if (!unproject(camera, pixel, ray)) {
+        EXPECT_GT(i, 180) << "theta " << reach * i / 200 / degree;
+        continue;
+      }
+      Vector2d again;
+      ASSERT_TRUE(project(camera, ray, again));
+      EXPECT_LT((again - pixel).norm(), 1e-6);
+      EXPECT_LT((ray - expected).norm(), 1e-6) << "theta " << reach * i / 200 / degree;
+      EXPECT_NEAR(ray.norm(), 1, 1e-12);
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 3000);
+}
+
+TEST_P(EveryCamera, PixelsRoundTrip) {
+  const Camera& camera = GetParam().camera;
+  int rays = 0;
+  for (double v = -20; v < camera.height + 20; v += 17.3) {
+    for (double u = -20; u < camera.width + 20; u += 17.3) {
+      Vector3d ray;
+      if (!unproject(camera, {u, v}, ray)) continue;
+      Vector2d pixel;
+      ASSERT_TRUE(project(camera, ray, pixel));
+      EXPECT_LT((pixel - Vector2d(u, v)).norm(), 2e-6);
+      ++rays;
+    }
+  }
+  EXPECT_GT(rays, 100);
+  Vector3d axis;
+  ASSERT_TRUE(unproject(camera, {camera.cx, camera.cy}, axis));
+  EXPECT_LT((axis - Vector3d::UnitZ()).norm(), 1e-12);
+}
+
+TEST_P(EveryCamera, JacobianMatchesFiniteDifferences) {
+  const Camera& camera = GetParam().camera;
+  const double reach = std::min(model_max_theta(camera), 2.6) * 0.97;
+  for (int i = 0; i <= 20; ++i) {
+    for (int j = 0; j < 8; ++j) {
+      const Vector3d point = 1.7 * direction(reach * i / 20, j * 45 * degree + 0.1);
+      Vector2d pixel;
+      Eigen::Matrix<double, 2, 3> jacobian;
+      ASSERT_TRUE(project(camera, point, pixel, jacobian));
+      Vector2d same;
+      ASSERT_TRUE(project(camera, point, same));
+      EXPECT_LT((same - pixel).norm(), 1e-9 * (1 + pixel.norm()));
+      if (pixel.norm() > 1e4) continue;
+      constexpr double h = 1e-6;
+      for (int k = 0; k < 3; ++k) {
+        Vector2d low;
+        Vector2d high;
+        if (!project(camera, point - h * Vector3d::Unit(k), low) ||
+            !project(camera, point + h * Vector3d::Unit(k), high)) {
+          continue;
+        }
+        const Vector2d numeric = (high - low) / (2 * h);
+        EXPECT_LT((numeric - jacobian.col(k)).norm(), 1e-4 * (1 + jacobian.norm()));
+      }
+    }
+  }
+}
+
+TEST_P(EveryCamera, DomainEndsAtTheModelsLimit) {
+  const Camera& camera = GetParam().camera;
+  const double limit = model_max_theta(camera);
+  Vector2d pixel;
+  EXPECT_TRUE(project(camera, direction(limit - 1e-6, 0), pixel));
+  if (limit < std::numbers::pi - 1e-6) {
+    EXPECT_FALSE(project(camera, direction(limit + 1e-6, 0), pixel));
+    EXPECT_FALSE(project(camera, direction(std::min(limit + 0.3, 3.1), 0), pixel));
+  }
+  EXPECT_FALSE(project(camera, Vector3d::Zero(), pixel));
+  // The radius must grow with theta all the way: no direction may fold back onto another.
+  double previous = -1;
+  for (int i = 1; i < 2000; ++i) {
+    ASSERT_TRUE(project(camera, direction(limit * i / 2000, 0), pixel));
+    const double radius = (pixel - Vector2d(camera.cx, camera.cy)).norm();
+    ASSERT_GT(radius, previous - 1e-3) << "theta " << limit * i / 2000 / degree;
+    previous = std::max(radius, previous);
+  }
+}
+
+TEST_P(EveryCamera, FieldOfViewLimitsProjectionAndRays) {
+  Camera camera = GetParam().camera;
+  camera.max_theta = 0.6 * model_max_theta(camera);
+  Vector2d pixel;
+  EXPECT_TRUE(project(camera, direction(camera.max_theta - 1e-6, 1), pixel));
+  Vector3d ray;
+  EXPECT_TRUE(unproject(camera, pixel, ray));
+  EXPECT_FALSE(project(camera, direction(camera.max_theta + 1e-6, 1), pixel));
+  const cv::Mat rays = ray_image(camera, {});
+  for (int y = 0; y < camera.height; y += 13) {
+    for (int x = 0; x < camera.width; x += 13) {
+      const cv::Vec4f r = rays.at<cv::Vec4f>(y, x);
+      const bool has_ray = unproject(camera, Vector2d(x, y), ray);
+      ASSERT_EQ(r[3] == 1, has_ray);
+      if (has_ray) {
+        EXPECT_LT((Eigen::Vector3f(r[0], r[1], r[2]).cast<double>() - ray).norm(), 1e-6);
+      }
+    }
+  }
+}
+
+TEST_P(EveryCamera, SinglePrecisionKernelAgrees) {
+  const Camera& camera = GetParam().camera;
+  const kernel::CameraParameters parameters = kernel_camera(camera);
+  const double reach = std::min(model_max_theta(camera), 2.2) * 0.97;
+  for (int i = 0; i <= 100; ++i) {
+    for (int j = 0; j < 12; ++j) {
+      const Vector3d point = direction(reach * i / 100, j * 30 * degree + 0.05);
+      const Eigen::Vector3f single = point.cast<float>();
+      Vector2d expected;
+      ASSERT_TRUE(project(camera, single.cast<double>(), expected));
+      // Inside or near the image, where it matters.
+      if (expected.x() < -100 || expected.y() < -100 || expected.x() > camera.width + 100 ||
+          expected.y() > camera.height + 100) {
+        continue;
+      }
+      kernel::vec2 pixel{};
+      ASSERT_TRUE(kernel::project(parameters, parameters.size.z,
+                                  kernel::vec3(single.x(), single.y(), single.z()), pixel));
+      EXPECT_NEAR(static_cast<double>(pixel.x), expected.x(), 1e-3);
+      EXPECT_NEAR(static_cast<double>(pixel.y), expected.y(), 1e-3);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, EveryCamera, ::testing::ValuesIn(cameras()),
+                         [](const auto& tested) { return std::string(tested.param.name); });
+
+/// Random points within `reach` of the axis, for comparison with OpenCV.
+std::vector<cv::Point3d> random_points(double reach) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<cv::Point3d> points;
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d p =
+        (0.5 + 3 * unit(random)) * direction(reach * unit(random), 6.28 * unit(random));
+    points.emplace_back(p.x(), p.y(), p.z());
+  }
+  return points;
+}
+
+cv::Matx33d matrix_of(const Camera& c) { return {c.fx, c.skew, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
+
+void expect_equal_projections(const Camera& camera, const std::vector<cv::Point3d>& points,
+                              const std::vector<cv::Point2d>& expected) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Vector2d pixel;
+    ASSERT_TRUE(project(camera, {points[i].x, points[i].y, points[i].z}, pixel));
+    EXPECT_NEAR(pixel.x(), expected[i].x, 1e-6);
+    EXPECT_NEAR(pixel.y(), expected[i].y, 1e-6);
+  }
+}
+
+TEST(OpenCvAgreement, Fisheye) {
+  for (const NamedCamera& named : cameras()) {
+    Camera c = named.camera;
+    if (c.model != CameraModel::kannala_brandt) continue;
+    const std::vector<cv::Point3d> points = random_points(1.4);  // OpenCV's reaches 90 degrees only
+    std::vector<cv::Point2d> pixels;
+    const double alpha = c.skew / c.fx;
+    const cv::Matx33d k(c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1);
+    cv::fisheye::projectPoints(points, pixels, cv::Vec3d(), cv::Vec3d(), k,
+                               cv::Vec4d(c.k1, c.k2, c.k3, c.k4), alpha);
+    expect_equal_projections(c, points, pixels);
+  }
+}
+
+TEST(OpenCvAgreement, Omnidir) {
+  for (const NamedCamera& named : cameras()) {
+    Camera c = named.camera;
+    if (c.model != CameraModel::mei) continue;
+    c.skew = 0.7;
+    const std::vector<cv::Point3d> points = random_points(0.97 * model_max_theta(c));
+    std::vector<cv::Point2d> pixels;
+    cv::omnidir::projectPoints(points, pixels, cv::Vec3d(), cv::Vec3d(), matrix_of(c), c.xi,
+                               cv::Vec4d(c.k1, c.k2, c.p1, c.p2));
+    expect_equal_projections(c, points, pixels);
+  }
+}
+
+TEST(OpenCvAgreement, PinholeRadtan) {
+  for (const NamedCamera& named : cameras()) {
+    const Camera& c = named.camera;
+    if (c.model != CameraModel::pinhole_radtan && c.model != CameraModel::pinhole) continue;
+    const std::vector<cv::Point3d> points = random_points(std::min(0.8, 0.97 * model_max_theta(c)));
+    std::vector<cv::Point2d> pixels;
+    cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), matrix_of(c),
+                      std::vector<double>{c.k1, c.k2, c.p1, c.p2, c.k3}, pixels);
+    expect_equal_projections(c, points, pixels);
+  }
+}
+
+TEST(ModelRelations, UnifiedIsDoubleSphereAndExtendedUnifiedInDisguise) {
+  Camera unified = make(CameraModel::unified, 512, 512, 300, 300, 256, 256);
+  unified.xi = 1.5;
+  const double alpha = unified.xi / (1 + unified.xi);
+  Camera extended = make(CameraModel::extended_unified, 512, 512, 300 / 2.5, 300 / 2.5, 256, 256);
+  extended.alpha = alpha;
+  extended.beta = 1;
+  Camera sphere = extended;
+  sphere.model = CameraModel::double_sphere;
+  sphere.xi = 0;
+  for (int i = 0; i < 50; ++i) {
+    const Vector3d point = direction(2.0 * i / 50, 0.3 * i);
+    Vector2d a;
+    Vector2d b;
+    Vector2d c;
+    ASSERT_TRUE(project(unified, point, a));
+    ASSERT_TRUE(project(extended, point, b));
+    ASSERT_TRUE(project(sphere, point, c));
+    EXPECT_LT((a - b).norm(), 1e-9);
+    EXPECT_LT((a - c).norm(), 1e-9);
+  }
+  EXPECT_NEAR(model_max_theta(unified), std::acos(-1 / 1.5), 1e-9);
+  EXPECT_NEAR(model_max_theta(unified), model_max_theta(sphere), 1e-9);
+}
+
+TEST(ModelLimits, ExactDoubleSphereDomain) {
+  // Limits computed independently from (xi d + z) > -w1 d2; the published condition is narrower.
+  Camera c = make(CameraModel::double_sphere, 512, 512, 158, 158, 255, 257);
+  c.xi = -0.17213086;
+  c.alpha = 0.59311776;
+  EXPECT_NEAR(model_max_theta(c) / degree, 126.2, 0.1);
+  c.xi = 0.46;
+  c.alpha = 0.77;
+  const auto inside = [&c](double theta) {
+    const double w1 = (1 - c.alpha) / c.alpha;
+    const double k = c.xi + std::cos(theta);
+    return k > -w1 * std::hypot(std::sin(theta), k);
+  };
+  EXPECT_TRUE(inside(model_max_theta(c) - 1e-9));
+  EXPECT_FALSE(inside(model_max_theta(c) + 1e-9));
+  c.xi = 0.9;
+  c.alpha = 0.6;
+  EXPECT_NEAR(model_max_theta(c) / degree, 173.9, 0.1);
+}
+
+TEST(Resizing, KeepsRaysOfCorrespondingPixels) {
+  Camera camera = cameras()[6].camera;
+  const Camera half = resized(camera, 256, 256);
+  // The corner between four pixels is the centre of one pixel of half size.
+  Vector3d full_ray;
+  Vector3d half_ray;
+  ASSERT_TRUE(unproject(camera, {100.5, 200.5}, full_ray));
+  ASSERT_TRUE(unproject(half, {50, 100}, half_ray));
+  EXPECT_LT((full_ray - half_ray).norm(), 1e-12);
+}
+
+TEST(RayImage, HonoursTheMask) {
+  const Camera camera = cameras()[6].camera;
+  cv::Mat mask(camera.height, camera.width, CV_8UC1, cv::Scalar(255));
+  mask(cv::Rect(0, 0, 256, 512)).setTo(0);
+  const cv::Mat rays = ray_image(camera, mask);
+  EXPECT_EQ(rays.at<cv::Vec4f>(250, 200)[3], 0);
+  EXPECT_GT(cv::norm(rays.at<cv::Vec4f>(250, 200)), 0.99) << "masked pixels keep their ray";
+  EXPECT_EQ(rays.at<cv::Vec4f>(250, 300)[3], 1);
+}
+
+TEST(CameraValidation, NamesWhatIsWrong) {
+  const auto message = [](auto change) {
+    Camera camera = cameras()[6].camera;
+    change(camera);
+    try {
+      validate(camera, "calib.yaml: cam0");
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  const auto has = [](const std::string& text, const char* part) {
+    return text.find(part) != std::string::npos && text.find("calib.yaml: cam0") == 0;
+  };
+  EXPECT_TRUE(has(message([](Camera& c) { c.fx = 0; }), "fx"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.fy = -3; }), "fy"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.cx = std::nan(""); }), "cx"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.cy = INFINITY; }), "cy"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.alpha = 1.2; }), "alpha"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.xi = -1.2; }), "xi"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.width = 0; }), "width"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.height = 100000; }), "height"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.max_theta = 0; }), "max_theta"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.max_theta = 4; }), "max_theta"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.model = CameraModel::unified; }), "xi"));
+  EXPECT_TRUE(has(message([](Camera& c) {
+                    c.model = CameraModel::extended_unified;
+                    c.beta = 0;
+                  }),
+                  "beta"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.model = CameraModel::field_of_view; }), "omega"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.model = static_cast<CameraModel>(42); }), "42"));
+  EXPECT_EQ(message([](Camera&) {}), "no error");
+}
+
+}  // namespace
+}  // namespace widestereo

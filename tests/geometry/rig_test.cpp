@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/rig.h"
+
+#include <gtest/gtest.h>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+Rig two_views() {
+  Rig rig;
+  rig.views.resize(2);
+  for (View& view : rig.views) {
+    view.name = "cam" + std::to_string(&view - rig.views.data());
+    view.camera.width = 64;
+    view.camera.height = 48;
+    view.camera.fx = view.camera.fy = 40;
+  }
+  rig.views[1].world_from_camera =
+      Eigen::Translation3d(0.2, 0, 0) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY());
+  return rig;
+}
+
+std::string message_of(const Rig& rig) {
+  try {
+    validate(rig, "rig.yaml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(RigValidation, AcceptsARig) { EXPECT_EQ(message_of(two_views()), ""); }
+
+TEST(RigValidation, NamesWhatIsWrong) {
+  Rig rig = two_views();
+  rig.views[1].world_from_camera.setIdentity();
+  EXPECT_NE(message_of(rig).find("baseline"), std::string::npos);
+
+  rig = two_views();
+  rig.views[1].world_from_camera.linear() *= 1.01;
+  EXPECT_NE(message_of(rig).find("cam1"), std::string::npos);
+  EXPECT_NE(message_of(rig).find("rigid"), std::string::npos);
+
+  rig = two_views();
+  rig.views[1].world_from_camera.linear().col(0) *= -1;  // a mirror
+  EXPECT_NE(message_of(rig).find("rigid"), std::string::npos);
+
+  rig = two_views();
+  rig.views[0].world_from_camera.translation().x() = std::nan("");
+  EXPECT_NE(message_of(rig).find("rigid"), std::string::npos);
+
+  rig = two_views();
+  rig.views[0].mask = cv::Mat(48, 63, CV_8UC1, cv::Scalar(1));
+  EXPECT_NE(message_of(rig).find("mask"), std::string::npos);
+  rig.views[0].mask = cv::Mat(48, 64, CV_32FC1, cv::Scalar(1));
+  EXPECT_NE(message_of(rig).find("mask"), std::string::npos);
+
+  EXPECT_NE(message_of(Rig{}).find("no cameras"), std::string::npos);
+}
+
+TEST(RigGeometry, RelativePoseMovesPoints) {
+  const Rig rig = two_views();
+  const Eigen::Vector3d world(0.5, -0.3, 2);
+  const Eigen::Vector3d in_first = rig.views[0].world_from_camera.inverse() * world;
+  const Eigen::Vector3d in_second = rig.views[1].world_from_camera.inverse() * world;
+  EXPECT_LT((source_from_reference(rig.views[1], rig.views[0]) * in_first - in_second).norm(),
+            1e-12);
+  EXPECT_NEAR(baseline(rig.views[0], rig.views[1]), 0.2, 1e-12);
+}
+
+}  // namespace
+}  // namespace widestereo
