@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <random>
+
+#include "data_folder.h"
+#include "temporary_folder.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+using test::TemporaryFolder;
+
+const char* const kalibr_text = R"(cam0:
+  camera_model: pinhole
+  intrinsics: [190.97, 190.96, 254.93, 256.89]
+  distortion_model: equidistant
+  distortion_coeffs: [0.0034, 0.0007, -0.002, 0.0002]
+  resolution: [512, 512]
+  rostopic: /cam0/image_raw
+cam1:
+  T_cn_cnm1:
+  - [0.9999994457734953, -0.0008233639921576076, -0.0006561436136444361, -0.10106110275180535]
+  - [0.0007916877528168117, 0.9988994619156757, -0.04689603624058988, -0.0019764575873431013]
+  - [0.0006940340102242531, 0.04689549078870055, 0.9988995601463054, -0.0011756424802046581]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: ds
+  intrinsics: [-0.17, 0.59, 157.9, 157.8, 252.5, 255.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [512, 480]
+  max_theta_deg: 97.5
+)";
+
+const char* const basalt_text = R"({"value0": {
+  "T_imu_cam": [
+    {"px": 0.0, "py": 0.0, "pz": 0.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": 1.0},
+    {"px": 0.1, "py": 0.01, "pz": -0.02, "qx": 0.0, "qy": 0.0998334166, "qz": 0.0, "qw": 0.9950041653}],
+  "intrinsics": [
+    {"camera_type": "ucm", "intrinsics": {"fx": 120.0, "fy": 121.0, "cx": 255.0, "cy": 256.0, "alpha": 0.6}},
+    {"camera_type": "kb4", "intrinsics": {"fx": 190.0, "fy": 191.0, "cx": 255.0, "cy": 256.0,
+     "k1": 0.003, "k2": 0.0007, "k3": -0.002, "k4": 0.0002}}],
+  "resolution": [[512, 510], [512, 510]],
+  "vignette": []}})";
+
+const char* const opencv_text = R"(%YAML:1.0
+---
+K1: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 392.2, 0.39, 631.6, 0., 393.2, 493.2, 0., 0., 1. ]
+D1: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ -0.028, 0.0001, -0.0076, 0.0024 ]
+K2: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 391.8, 0., 620.6, 0., 392.6, 489.2, 0., 0., 1. ]
+D2: !!opencv-matrix
+   rows: 1
+   cols: 4
+   dt: d
+   data: [ -0.031, 0.003, -0.008, 0.002 ]
+R: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]
+T: !!opencv-matrix
+   rows: 3
+   cols: 1
+   dt: d
+   data: [ -0.125, 0., 0. ]
+image_width: 1280
+image_height: 960
+)";
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+std::string error_of(const std::filesystem::path& path) {
+  try {
+    read_calibration(path);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Kalibr, ReadsModelsPosesAndTheFieldOfView) {
+  const TemporaryFolder folder;
+  const Calibration c = read_calibration(folder.write("chain.yaml", kalibr_text));
+  EXPECT_EQ(c.format, CalibrationFormat::kalibr);
+  ASSERT_EQ(c.rig.views.size(), 2u);
+  const Camera& kb = c.rig.views[0].camera;
+  EXPECT_EQ(kb.model, CameraModel::kannala_brandt);
+  EXPECT_EQ(kb.fx, 190.97);
+  EXPECT_EQ(kb.cy, 256.89);
+  EXPECT_EQ(kb.k3, -0.002);
+  const Camera& ds = c.rig.views[1].camera;
+  EXPECT_EQ(ds.model, CameraModel::double_sphere);
+  EXPECT_EQ(ds.xi, -0.17);
+  EXPECT_EQ(ds.alpha, 0.59);
+  EXPECT_EQ(ds.height, 480);
+  EXPECT_NEAR(ds.max_theta, 97.5 * std::numbers::pi / 180, 1e-15);
+  // T_cn_cnm1 takes points of camera 0 to camera 1.
+  const Eigen::Vector3d moved =
+      source_from_reference(c.rig.views[1], c.rig.views[0]) * Eigen::Vector3d(0, 0, 1);
+  EXPECT_NEAR(moved.x(), -0.10106110275180535 - 0.0006561436136444361, 1e-9);
+  EXPECT_NEAR(moved.y(), -0.0019764575873431013 - 0.04689603624058988, 1e-9);
+}
+
+TEST(Kalibr, ReadsEveryCombination) {
+  const TemporaryFolder folder;
+  const auto read = [&](const char* model, const char* intrinsics, const char* distortion,
+                        const char* coefficients) {
+    const std::string text =
+        std::string("cam0:\n  camera_model: ") + model + "\n  intrinsics: " + intrinsics +
+        "\n  distortion_model: " + distortion + "\n  distortion_coeffs: " + coefficients +
+        "\n  resolution: [640, 480]\n";
+    return read_calibration(folder.write("one.yaml", text)).rig.views[0].camera;
+  };
+  const char* four = "[0.1, 0.02, 0.003, 0.0004]";
+  EXPECT_EQ(read("pinhole", "[4e2, 401, 320, 240]", "none", "[]").model, CameraModel::pinhole);
+  Camera c = read("pinhole", "[400, 401, 320, 240]", "radtan", four);
+  EXPECT_EQ(c.model, CameraModel::pinhole_radtan);
+  EXPECT_EQ(c.p1, 0.003);
+  c = read("pinhole", "[400, 401, 320, 240]", "fov", "[0.93]");
+  EXPECT_EQ(c.model, CameraModel::field_of_view);
+  EXPECT_EQ(c.omega, 0.93);
+  c = read("omni", "[0.9, 400, 401, 320, 240]", "none", "[0, 0, 0, 0]");
+  EXPECT_EQ(c.model, CameraModel::unified);
+  EXPECT_EQ(c.xi, 0.9);
+  EXPECT_EQ(c.fy, 401);
+  c = read("omni", "[1.2, 400, 401, 320, 240]", "radtan", four);
+  EXPECT_EQ(c.model, CameraModel::mei);
+  EXPECT_EQ(c.p2, 0.0004);
+  c = read("eucm", "[0.6, 1.1, 400, 401, 320, 240]", "none", "[]");
+  EXPECT_EQ(c.model, CameraModel::extended_unified);
+  EXPECT_EQ(c.beta, 1.1);
+}
+
+TEST(Kalibr, ReadsFilesWithOpenCvsHeader) {
+  const TemporaryFolder folder;
+  const std::string text =
+      std::string("%YAML:1.0 # need to specify the file type at the top!\n\n") + kalibr_text;
+  EXPECT_EQ(read_calibration(folder.write("openvins.yaml", text)).rig.views.size(), 2u);
+}
+
+TEST(Basalt, ConvertsAlphaFormAndPoses) {
+  const TemporaryFolder folder;
+  const Calibration c = read_calibration(folder.write("calib.json", basalt_text));
+  EXPECT_EQ(c.format, CalibrationFormat::basalt);
+  const Camera& ucm = c.rig.views[0].camera;
+  EXPECT_EQ(ucm.model, CameraModel::unified);
+  EXPECT_NEAR(ucm.xi, 1.5, 1e-12);
+  // The alpha form itself, written out.
+  const Eigen::Vector3d point(0.7, -0.4, 0.2);
+  const double denominator = 0.6 * point.norm() + 0.4 * point.z();
+  Eigen::Vector2d pixel;
+  ASSERT_TRUE(project(ucm, point, pixel));
+  EXPECT_NEAR(pixel.x(), 120 * point.x() / denominator + 255, 1e-9);
+  EXPECT_NEAR(pixel.y(), 121 * point.y() / denominator + 256, 1e-9);
+  // T_imu_cam is camera to rig.
+  EXPECT_NEAR(c.rig.views[1].world_from_camera.translation().x(), 0.1, 1e-12);
+  EXPECT_NEAR(Eigen::AngleAxisd(c.rig.views[1].world_from_camera.linear()).angle(), 0.2, 1e-8);
+}
+
+TEST(OpenCv, ReadsFisheyeStereo) {
+  const TemporaryFolder folder;
+  const Calibration c = read_calibration(folder.write("stereo.yml", opencv_text));
+  EXPECT_EQ(c.format, CalibrationFormat::opencv);
+  ASSERT_EQ(c.rig.views.size(), 2u);
+  const Camera& left = c.rig.views[0].camera;
+  EXPECT_EQ(left.model, CameraModel::kannala_brandt);
+  EXPECT_EQ(left.skew, 0.39);
+  EXPECT_EQ(left.k4, 0.0024);
+  EXPECT_EQ(left.width, 1280);
+  // X_right = R X_left + T with T.x negative: the right camera is to the right.
+  EXPECT_NEAR(c.rig.views[1].world_from_camera.translation().x(), 0.125, 1e-12);
+}
+
+TEST(OpenCv, TakesTheSizeFromTheImages) {
+  const TemporaryFolder folder;
+  const std::string text =
+      replaced(replaced(opencv_text, "image_width: 1280\n", ""), "image_height: 960\n", "");
+  const auto path = folder.write("stereo.yml", text);
+  EXPECT_NE(error_of(path).find("image size"), std::string::npos);
+  EXPECT_EQ(read_calibration(path, {1280, 960}).rig.views[1].camera.height, 960);
+  EXPECT_THROW(read_calibration(folder.write("with.yml", opencv_text), {640, 480}), Error);
+}
+
+TEST(OpenCv, ReadsOmnidir) {
+  const TemporaryFolder folder;
+  const auto path = folder / "omni.xml";
+  {
+    cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
+    file << "K" << cv::Mat(cv::Matx33d(600, 0.5, 320, 0, 601, 240, 0, 0, 1));
+    file << "xi" << 1.3;
+    file << "D" << cv::Mat(cv::Matx14d(-0.2, 0.05, 0.001, -0.002));
+    file << "image_width" << 640 << "image_height" << 480;
+  }
+  const Camera c = read_calibration(path).rig.views[0].camera;
+  EXPECT_EQ(c.model, CameraModel::mei);
+  EXPECT_EQ(c.xi, 1.3);
+  EXPECT_EQ(c.skew, 0.5);
+  EXPECT_EQ(c.p2, -0.002);
+}
+
+TEST(Writing, RoundTripsExactly) {
+  const TemporaryFolder folder;
+  const Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  const auto same = [&](const Rig& again) {
+    ASSERT_EQ(again.views.size(), rig.views.size());
+    for (std::size_t i = 0; i < rig.views.size(); ++i) {
+      const Camera& a = rig.views[i].camera;
+      const Camera& b = again.views[i].camera;
+      EXPECT_EQ(a.model, b.model);
+      EXPECT_NEAR(a.fx, b.fx, 1e-12);
+      EXPECT_NEAR(a.cy, b.cy, 1e-12);
+      EXPECT_NEAR(a.xi, b.xi, 1e-12);
+      EXPECT_NEAR(a.k3, b.k3, 1e-12);
+      EXPECT_NEAR(a.max_theta, b.max_theta, 1e-12);
+      EXPECT_EQ(a.height, b.height);
+      EXPECT_LT(
+          (rig.views[i].world_from_camera.matrix() - again.views[i].world_from_camera.matrix())
+              .norm(),
+          1e-9);
+    }
+  };
+  write_kalibr(folder / "again.yaml", rig);
+  same(read_calibration(folder / "again.yaml").rig);
+  write_basalt(folder / "again.json", rig);
+  const Calibration json = read_calibration(folder / "again.json");
+  EXPECT_EQ(json.format, CalibrationFormat::basalt);
+  same(json.rig);
+}
+
+TEST(Writing, RefusesWhatAFormatCannotHold) {
+  const TemporaryFolder folder;
+  const Rig rig = read_calibration(folder.write("stereo.yml", opencv_text)).rig;  // has skew
+  EXPECT_THROW(write_kalibr(folder / "a.yaml", rig), Error);
+  EXPECT_THROW(write_basalt(folder / "a.json", rig), Error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.yaml"));
+  EXPECT_THROW(write_kalibr(folder / "no/such/folder.yaml",
+                            read_calibration(folder.write("c.yaml", kalibr_text)).rig),
+               Error);
+}
+
+TEST(BadCalibration, EveryMistakeIsNamed) {
+  const TemporaryFolder folder;
+  const auto path = folder / "bad";
+  const auto message = [&](const std::string& text) { return error_of(folder.write("bad", text)); };
+  const auto expect = [&](const std::string& text, const char* part) {
+    const std::string error = message(text);
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+    EXPECT_NE(error.find(path.string()), std::string::npos) << error;
+  };
+  EXPECT_NE(error_of(folder / "missing.yaml").find("no calibration file"), std::string::npos);
+  EXPECT_NE(error_of(folder.path()).find("not a file"), std::string::npos);
+  expect("", "empty");
+  expect("hello world\n", "no calibration");
+  expect(std::string("\x89PNG\r\n\x1a\n\0\0\0", 11), "no calibration");
+  expect("cam0: 5\n", "camera_model");
+  expect("cam0: [1\n", "YAML");
+  expect("camera_model: pinhole\n", "no cameras");
+  expect(replaced(kalibr_text, "pinhole", "catadioptric"), "catadioptric");
+  expect(replaced(kalibr_text, "equidistant", "thin_prism"), "thin_prism");
+  expect(replaced(kalibr_text, "distortion_model: none", "distortion_model: radtan"), "radtan");
+  expect(replaced(kalibr_text, "[190.97, 190.96, 254.93, 256.89]", "[190.97, 190.96, 254.93]"),
+         "intrinsics");
+  expect(replaced(kalibr_text, "190.97", ".nan"), "finite");
+  expect(replaced(kalibr_text, "190.97", "wide"), "finite");
+  expect(replaced(kalibr_text, "190.97", "-190.97"), "fx");
+  expect(replaced(kalibr_text, "-0.17, 0.59", "-0.17, 1.59"), "alpha");
+  expect(replaced(kalibr_text, "  resolution: [512, 512]\n", ""), "resolution");
+  expect(replaced(kalibr_text, "resolution: [512, 512]", "resolution: [512.5, 512]"), "resolution");
+  expect(replaced(kalibr_text, "T_cn_cnm1", "T_cam_imu"), "T_cn_cnm1");
+  expect(replaced(kalibr_text, "0.9999994457734953", "1.2"), "rigid");
+  expect(replaced(kalibr_text, "max_theta_deg: 97.5", "max_theta_deg: 400"), "max_theta");
+  expect(replaced(replaced(replaced(kalibr_text, "-0.10106110275180535", "0"),
+                           "-0.0019764575873431013", "0"),
+                  "-0.0011756424802046581", "0"),
+         "baseline");
+  expect("{\"value1\": 3}", "value0");
+  expect("{\"value0\": {}}", "intrinsics");
+  expect("{\"value0\": [", "JSON");
+  expect(replaced(basalt_text, "\"ucm\"", "\"ocam\""), "ocam");
+  expect(replaced(basalt_text, "\"alpha\": 0.6", "\"alpha\": 1.0"), "alpha");
+  expect(replaced(basalt_text, "\"fx\": 120.0", "\"fx\": \"120\""), "fx");
+  expect(replaced(basalt_text, "\"qw\": 1.0", "\"qw\": 2.0"), "quaternion");
+  expect(replaced(basalt_text, "[512, 510], ", ""), "length");
+  expect(replaced(opencv_text, "K1:", "A1:"), "K1");
+  expect(replaced(opencv_text, "T: !!", "U: !!"), "translation");
+  expect(replaced(opencv_text, "[ 1., 0., 0., 0., 1.", "[ 1., 0., 0., 0., 2."), "rigid");
+  expect(replaced(opencv_text, "[ -0.125, 0., 0. ]", "[ 0., 0., 0. ]"), "baseline");
+  expect(replaced(opencv_text, "-0.028", ".Nan"), "");
+}
+
+/// Whatever bytes come, the reader answers with a rig or an Error.
+TEST(BadCalibration, DamagedFilesNeverCrash) {
+  const TemporaryFolder folder;
+  std::mt19937 random(11);
+  int refused = 0;
+  for (const std::string& text :
+       {std::string(kalibr_text), std::string(basalt_text), std::string(opencv_text)}) {
+    for (std::size_t size = 0; size < text.size(); size += 7) {
+      refused += !error_of(folder.write("cut", text.substr(0, size))).empty();
+    }
+    for (int round = 0; round < 300; ++round) {
+      std::string damaged = text;
+      for (int i = 0; i < 3; ++i) {
+        damaged[random() % damaged.size()] = static_cast<char>(random() % 256);
+      }
+      refused += !error_of(folder.write("damaged", damaged)).empty();
+    }
+  }
+  EXPECT_GT(refused, 400);
+}
+
+TEST(RealCalibrations, AreReadOrRefusedClearly) {
+  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  int read = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(test::data_folder())) {
+    const std::string extension = entry.path().extension().string();
+    if (extension != ".yaml" && extension != ".yml" && extension != ".json") continue;
+    try {
+      const Calibration c = read_calibration(entry.path(), {1280, 960});
+      EXPECT_FALSE(c.rig.views.empty());
+      ++read;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(entry.path().string()), std::string::npos);
+    }
+  }
+  EXPECT_GT(read, 25);
+  const auto real = test::data_folder() / "real";
+  const Rig tumvi = read_calibration(real / "tumvi_single_frame/calib.yaml").rig;
+  EXPECT_NEAR(baseline(tumvi.views[0], tumvi.views[1]), 0.1010, 2e-4);
+  const Rig basalt = read_calibration(real / "calibrations/basalt/tumvi_512_ds_calib.json").rig;
+  EXPECT_NEAR(baseline(basalt.views[0], basalt.views[1]), 0.1010, 2e-4);
+  const Rig converted =
+      read_calibration(real / "calibrations/basalt_tumvi_512_ds_calib.camchain.yaml").rig;
+  EXPECT_LT(
+      (basalt.views[1].world_from_camera.matrix() - converted.views[1].world_from_camera.matrix())
+          .norm(),
+      1e-6);
+}
+
+}  // namespace
+}  // namespace widestereo

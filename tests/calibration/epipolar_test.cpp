@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/epipolar.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "data_folder.h"
+#include "widestereo/calibration.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+Rig rig_with_rotation_error(double degrees) {
+  Rig rig;
+  rig.views.resize(2);
+  for (int i = 0; i < 2; ++i) {
+    Camera& c = rig.views[i].camera;
+    rig.views[i].name = "cam" + std::to_string(i);
+    c.model = CameraModel::double_sphere;
+    c.width = c.height = 512;
+    c.fx = c.fy = 158;
+    c.cx = c.cy = 255;
+    c.xi = -0.17;
+    c.alpha = 0.59;
+  }
+  rig.views[1].world_from_camera =
+      Eigen::Translation3d(0.1, 0, 0) *
+      Eigen::AngleAxisd(degrees * 3.14159265358979 / 180, Eigen::Vector3d::UnitX());
+  return rig;
+}
+
+std::vector<PixelMatch> exact_matches(const Rig& rig) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::vector<PixelMatch> matches;
+  while (matches.size() < 400) {
+    const Eigen::Vector3d point(2 * unit(random), 2 * unit(random), 1.6 + 0.5 * unit(random));
+    PixelMatch match;
+    if (project(rig.views[0].camera, point, match.first) &&
+        project(rig.views[1].camera, rig.views[1].world_from_camera.inverse() * point,
+                match.second)) {
+      matches.push_back(match);
+    }
+  }
+  return matches;
+}
+
+TEST(Epipolar, ExactMatchesHaveNoErrorAndTheirDistances) {
+  const Rig rig = rig_with_rotation_error(0);
+  const EpipolarReport report = check_epipolar(rig.views[0], rig.views[1], exact_matches(rig));
+  EXPECT_EQ(report.matches, 400);
+  EXPECT_LT(report.median_pixels, 1e-6);
+  EXPECT_EQ(report.below_1_pixel, 1);
+  EXPECT_GT(report.nearest, 1.1);
+  EXPECT_LT(report.farthest, 3.6);
+  EXPECT_GT(report.typical, report.nearest);
+}
+
+TEST(Epipolar, MeasuresAKnownRotationError) {
+  // One degree about the baseline moves every epipolar plane by up to one degree.
+  const std::vector<PixelMatch> matches = exact_matches(rig_with_rotation_error(0));
+  const Rig wrong = rig_with_rotation_error(1);
+  const EpipolarReport report = check_epipolar(wrong.views[0], wrong.views[1], matches);
+  EXPECT_GT(report.median_degrees, 0.4);
+  EXPECT_LT(report.median_degrees, 1.01);
+  EXPECT_GT(report.median_pixels, 1);
+  EXPECT_LT(report.median_pixels, 4);
+}
+
+TEST(Epipolar, NeedsMatches) {
+  const Rig rig = rig_with_rotation_error(0);
+  EXPECT_THROW(check_epipolar(rig.views[0], rig.views[1], {}), Error);
+  const cv::Mat flat(128, 128, CV_8UC1, cv::Scalar(90));
+  EXPECT_TRUE(match_features(flat, flat).empty());
+}
+
+TEST(Epipolar, RealPairsAreAsGoodAsTheirCalibration) {
+  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  const auto set = test::data_folder() / "real/vfs_t265_fs";
+  const Rig rig = read_calibration(set / "calib.yaml").rig;
+  const EpipolarReport report =
+      check_epipolar(rig.views[0], rig.views[1],
+                     match_features(read_image(set / "cam0.png"), read_image(set / "cam1.png")));
+  EXPECT_GT(report.matches, 500);
+  EXPECT_LT(report.median_pixels, 0.4);
+  EXPECT_NEAR(report.typical, 1.3, 0.4);
+}
+
+}  // namespace
+}  // namespace widestereo
