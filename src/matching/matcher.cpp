@@ -49,6 +49,15 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
   }
 }
 
+void require_overlap(const std::vector<ViewResult>& views) {
+  for (const ViewResult& view : views) {
+    if (cv::countNonZero(view.cost < no_plane_cost) > 0) return;
+  }
+  throw Error(
+      "The images do not overlap: no pixel of any view is seen by another one within the distance "
+      "range; check the calibration, the order of the images, masks and the range.");
+}
+
 void unpack_checks(const cv::Mat& checks, ViewResult& result) {
   std::vector<cv::Mat> channels;
   cv::split(checks, channels);
@@ -98,6 +107,7 @@ class Matcher::Implementation {
       unpack_hypotheses(rays_[i], view);
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
     }
+    require_overlap(result.views);
     for (const Dispatch& dispatch : schedule_.dispatches) result.samples += dispatch.samples;
     result.times = backend_->times();
     result.device_bytes = backend_->device_bytes();

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: MIT
+// The command as a user meets it: results, messages, exit codes, and nothing half-written.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "temporary_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using widestereo::test::TemporaryFolder;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;  ///< standard output and error
+};
+
+Outcome run(const std::string& arguments, const std::string& environment = "") {
+  // Leaks of drivers are not the command's.
+  const std::string command = environment + " ASAN_OPTIONS=detect_leaks=0 " WIDESTEREO_COMMAND " " +
+                              arguments + " 2>&1 < /dev/null";
+  Outcome outcome;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return outcome;
+  std::array<char, 4096> buffer{};
+  std::size_t count = 0;
+  while ((count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0) {
+    outcome.output.append(buffer.data(), count);
+  }
+  const int status = pclose(pipe);
+  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  return outcome;
+}
+
+/// A rendered pair with its calibration, and options that make matching quick.
+class Command : public ::testing::Test {
+ protected:
+  static constexpr const char* quick =
+      " --device cpu --iterations 2 --second-iterations 1 --window-radius 2"
+      " --min-distance 0.4 --max-distance 8 ";
+
+  void SetUp() override {
+    const std::string calibration = R"(cam0:
+  camera_model: ds
+  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [96, 96]
+  max_theta_deg: 97.5
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.1]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: ds
+  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [96, 96]
+)";
+    folder_.write("calib.yaml", calibration);
+    cv::Mat noise(96, 96, CV_8UC3);
+    cv::theRNG().state = 3;
+    cv::randu(noise, 0, 255);
+    cv::imwrite(file("left.png"), noise);
+    cv::imwrite(file("right.png"), noise);
+  }
+
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string depth_of(const std::string& left, const std::string& right,
+                       const std::string& calibration = "calib.yaml") const {
+    return "depth " + file(left) + " " + file(right) + " -c " + file(calibration) + " -o " +
+           file("out") + quick;
+  }
+  /// Fails, with a message that has `part`, exit code 1 and no map written.
+  void expect_error(const std::string& arguments, const std::string& part) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find("widestereo: "), std::string::npos) << outcome.output;
+    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
+    EXPECT_FALSE(fs::exists(folder_ / "out/result.json"));
+    EXPECT_FALSE(fs::exists(folder_ / "out/distance0.tiff"));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Command, DemoScoresItself) {
+  const Outcome outcome =
+      run("demo --size 96 --device cpu --iterations 6 --second-iterations 3 --window-radius 3 -o " +
+          file("demo"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("non-occluded"), std::string::npos);
+  for (const char* name : {"distance0.tiff", "distance1.tiff", "distance_accepted0.tiff",
+                           "normals0.tiff", "cost0.tiff", "confidence0.tiff", "reasons0.png",
+                           "cloud0.ply", "summary0.png", "distance_preview0.png", "result.json"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "demo" / name)) << name;
+  }
+  std::ifstream stream(folder_ / "demo/result.json");
+  const nlohmann::json record = nlohmann::json::parse(stream);
+  EXPECT_LT(record["scores"][1]["bad_pixels"]["2.0"].get<double>(), 0.3);
+  EXPECT_EQ(record["device"]["id"], "cpu");
+  EXPECT_EQ(record["options"]["first_iterations"], 6);
+  for (const auto& entry : fs::directory_iterator(folder_ / "demo")) {
+    EXPECT_EQ(entry.path().string().find(".writing"), std::string::npos) << entry.path();
+  }
+}
+
+TEST_F(Command, DepthWritesEveryFormatAndJson) {
+  const Outcome outcome = run(depth_of("left.png", "right.png") + "--formats tiff,pfm,png --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(record["views"].size(), 2u);
+  const cv::Mat tiff = cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED);
+  const cv::Mat png = cv::imread(file("out/distance0.png"), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(tiff.type(), CV_32FC1);
+  ASSERT_EQ(png.type(), CV_16UC1);
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      EXPECT_NEAR(png.at<ushort>(y, x) / 1000.0, static_cast<double>(tiff.at<float>(y, x)), 6e-4);
+    }
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "out/distance0.pfm"));
+}
+
+TEST_F(Command, BadImagesAreNamed) {
+  folder_.write("empty.png", "");
+  folder_.write("garbage.png", "this is no image");
+  std::string whole;
+  {
+    std::ifstream stream(folder_ / "left.png", std::ios::binary);
+    whole.assign(std::istreambuf_iterator<char>(stream), {});
+  }
+  folder_.write("cut.png", whole.substr(0, whole.size() / 2));
+  cv::imwrite(file("small.png"), cv::Mat(48, 96, CV_8UC1, cv::Scalar(7)));
+  expect_error(depth_of("missing.png", "right.png"), "missing.png");
+  expect_error(depth_of("left.png", "empty.png"), "empty.png");
+  expect_error(depth_of("garbage.png", "right.png"), "garbage.png");
+  expect_error(depth_of("left.png", "cut.png"), "truncated");
+  expect_error(depth_of("left.png", "small.png"), "96x48");
+  expect_error(depth_of("calib.yaml", "right.png"), "calib.yaml");
+  expect_error(depth_of("left.png", "right.png") + "--mask " + file("small.png"), "mask");
+  expect_error(depth_of("left.png", "right.png") + "--mask " + file("no.png"), "no.png");
+}
+
+TEST_F(Command, BadCalibrationsAndOptionsAreNamed) {
+  folder_.write("bad.yaml", "cam0: {camera_model: ocam}");
+  expect_error(depth_of("left.png", "right.png", "bad.yaml"), "ocam");
+  expect_error(depth_of("left.png", "right.png", "none.yaml"), "none.yaml");
+  expect_error(depth_of("left.png", "right.png") + "--views 0,5", "camera 5");
+  expect_error(depth_of("left.png", "right.png") + "--views 0", "--views");
+  const std::string plain = "depth " + file("left.png") + " " + file("right.png") + " -c " +
+                            file("calib.yaml") + " -o " + file("out") + " --device cpu";
+  expect_error(plain + " --min-distance -1", "distance range");
+  expect_error(plain + " --min-distance 5 --max-distance 2", "distance range");
+  expect_error(plain + " --max-distance inf", "distance range");
+  expect_error(plain + " --max-distance nan", "distance range");
+  expect_error(plain + " --window-radius 99", "window radius");
+  expect_error(plain + "x", "cpux");
+  expect_error("depth " + file("left.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
+                   " -o " + file("left.png/out") + quick,
+               "output folder");
+  EXPECT_NE(run("depth " + file("left.png")).exit_code, 0);
+  EXPECT_NE(run("depth " + file("left.png") + " --no-such-option").exit_code, 0);
+  EXPECT_NE(run(plain + " --preset nonsense").exit_code, 0);
+}
+
+TEST_F(Command, ImagesWithoutOverlapAreRefused) {
+  std::string text;
+  {
+    std::ifstream stream(folder_ / "calib.yaml");
+    text.assign(std::istreambuf_iterator<char>(stream), {});
+  }
+  // Camera 1 looks backwards through a narrow lens.
+  for (const auto& [from, to] :
+       {std::pair<std::string, std::string>("[1.0, 0.0, 0.0, -0.1]", "[-1.0, 0.0, 0.0, 0.1]"),
+        {"[0.0, 0.0, 1.0, 0.0]\n  - [0.0", "[0.0, 0.0, -1.0, 0.0]\n  - [0.0"},
+        {"  max_theta_deg: 97.5\n", "  max_theta_deg: 40\n"}}) {
+    text.replace(text.find(from), from.size(), to);
+  }
+  text += "  max_theta_deg: 40\n";
+  folder_.write("apart.yaml", text);
+  expect_error(depth_of("left.png", "right.png", "apart.yaml"), "do not overlap");
+}
+
+TEST_F(Command, WithoutAVulkanDriverItSaysSoAndUsesTheCpu) {
+  const std::string no_driver =
+      "VK_ICD_FILENAMES=/nonexistent.json VK_DRIVER_FILES=/nonexistent.json";
+  const std::string arguments =
+      "demo --size 64 --iterations 1 --second-iterations 0 -o " + file("demo");
+  const Outcome strict = run(arguments + " --device vulkan", no_driver);
+  EXPECT_EQ(strict.exit_code, 1);
+  EXPECT_NE(strict.output.find("No Vulkan device"), std::string::npos) << strict.output;
+  const Outcome automatic = run(arguments, no_driver);
+  EXPECT_EQ(automatic.exit_code, 0) << automatic.output;
+  EXPECT_NE(automatic.output.find("Using the CPU"), std::string::npos) << automatic.output;
+}
+
+TEST_F(Command, EvaluateScoresAndRefuses) {
+  cv::Mat truth(96, 96, CV_32FC1, cv::Scalar(2.0));
+  cv::imwrite(file("truth.tiff"), truth);
+  cv::Mat prediction = truth * 1.015;
+  cv::imwrite(file("prediction.tiff"), prediction);
+  const std::string common = " -c " + file("calib.yaml") + " --truth " + file("truth.tiff");
+  const Outcome outcome = run("evaluate " + file("prediction.tiff") + common +
+                              " --json --error-map " + file("error.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json scores = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(scores[0]["bad_relative"]["0.01"], 1.0);
+  EXPECT_EQ(scores[0]["bad_relative"]["0.02"], 0.0);
+  EXPECT_TRUE(fs::exists(file("error.png")));
+  expect_error("evaluate " + file("no.tiff") + common, "no.tiff");
+  expect_error("evaluate " + file("left.png") + common, "left.png");
+  expect_error("evaluate " + file("prediction.tiff"), "--truth");
+  cv::imwrite(file("half.tiff"), prediction(cv::Rect(0, 0, 48, 96)));
+  expect_error("evaluate " + file("half.tiff") + common, "48x96");
+  expect_error("evaluate " + file("prediction.tiff") + common + " --source 7", "--source");
+}
+
+TEST_F(Command, CalibrationShowsConvertsAndChecks) {
+  Outcome outcome = run("calibration show " + file("calib.yaml") + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json shown = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(shown["views"][0]["model"], "double_sphere");
+  EXPECT_NEAR(shown["pairs"][0]["baseline_metres"].get<double>(), 0.1, 1e-12);
+  EXPECT_EQ(run("calibration show " + file("calib.yaml")).exit_code, 0);
+  outcome =
+      run("calibration convert " + file("calib.yaml") + " " + file("calib.json") + " --to basalt");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(run("calibration show " + file("calib.json")).exit_code, 0);
+  expect_error("calibration show " + file("left.png"), "left.png");
+  cv::imwrite(file("flat.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(7)));
+  expect_error("calibration check " + file("flat.png") + " " + file("flat.png") + " -c " +
+                   file("calib.yaml"),
+               "features match");
+  outcome = run("calibration check " + file("left.png") + " " + file("right.png") + " -c " +
+                file("calib.yaml") + " --json");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+}
+
+TEST_F(Command, HelpAndVersion) {
+  for (const char* arguments :
+       {"--help", "demo --help", "depth --help", "evaluate --help", "calibration --help",
+        "calibration show --help", "devices --help", "--version", "devices", "devices --json"}) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << arguments << outcome.output;
+    EXPECT_FALSE(outcome.output.empty());
+  }
+  EXPECT_NE(run("").exit_code, 0);
+}
+
+}  // namespace
