@@ -77,11 +77,11 @@ cv::Mat decode(const fs::path& path) {
   return image;
 }
 
-void encode(const fs::path& path, const cv::Mat& image) {
+void encode(const fs::path& path, const cv::Mat& image, const std::vector<int>& parameters = {}) {
   write_atomically(path, [&](const fs::path& temporary) {
     bool written = false;
     try {
-      written = cv::imwrite(temporary.string(), image);
+      written = cv::imwrite(temporary.string(), image, parameters);
     } catch (const cv::Exception&) {
       written = false;
     }
@@ -182,7 +182,9 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
   if (extension == ".pfm") {
     write_atomically(path, [&](const fs::path& temporary) { write_pfm(temporary, map); });
   } else if (extension == ".tif" || extension == ".tiff") {
-    encode(path, with_channels_swapped(map));
+    // By default OpenCV compresses three float channels with loss (LogLuv).
+    constexpr int no_compression = 1;
+    encode(path, with_channels_swapped(map), {cv::IMWRITE_TIFF_COMPRESSION, no_compression});
   } else if (extension == ".png" && map.channels() == 1) {
     encode(path, to_png16(map, png_scale));
   } else {
