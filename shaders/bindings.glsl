@@ -12,13 +12,15 @@ layout(constant_id = 3) const int VIEW_COUNT = 2;
 // How intensities are read, with the same bits either way: GPUs gather four texels in one instruction,
 // software devices load texels without their texture machinery (a quarter faster on lavapipe).
 layout(constant_id = 4) const bool SAMPLED = true;
+layout(constant_id = 5) const int PATTERN = 0;
+layout(constant_id = 6) const int WEIGHTED = 0;
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
 layout(set = 0, binding = 1) uniform sampler2DArray intensity_texture;
-layout(set = 0, binding = 2, r32f) readonly uniform image2DArray intensities;
+layout(set = 0, binding = 2, r32f) uniform image2DArray intensities;
 layout(set = 0, binding = 3, rgba32f) readonly uniform image2DArray rays;
-layout(set = 0, binding = 4, rgba32f) uniform image2DArray hypotheses;
-layout(set = 0, binding = 5, rgba32f) writeonly uniform image2DArray checks;
+layout(set = 0, binding = 4, rgba32f) uniform image2DArray hypotheses;  // and priors, in as many further layers
+layout(set = 0, binding = 5, rgba32f) uniform image2DArray checks;
 layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
 layout(push_constant) uniform PassBlock { PassParameters pass; };
@@ -44,6 +46,16 @@ vec4 intensity_taps(int view, ivec2 p) {
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }
 
 void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, ivec3(p, view), h); }
+
+void store_intensity(int view, ivec2 p, float intensity) {
+  imageStore(intensities, ivec3(p, view), vec4(intensity, 0.0f, 0.0f, 0.0f));
+}
+
+vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, VIEW_COUNT + view)); }
+
+void store_prior(int view, ivec2 p, vec4 m) { imageStore(hypotheses, ivec3(p, VIEW_COUNT + view), m); }
+
+vec4 check_at(int view, ivec2 p) { return imageLoad(checks, ivec3(p, view)); }
 
 void store_check(int view, ivec2 p, vec4 c) { imageStore(checks, ivec3(p, view), c); }
 

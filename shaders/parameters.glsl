@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What the host tells the kernels: one block for a match, one small block for a dispatch.
 
-#define MAX_VIEWS 8
+// Views at all levels of the image pyramid.
+#define MAX_VIEWS 16
 
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {
@@ -16,6 +17,7 @@ struct MatchParameters {
   vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; unused
   vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
   ivec4 search;       // distance sampling, refinements, best sources, number of views
+  vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; unused
   CameraParameters cameras[MAX_VIEWS];
   ViewPair pairs[MAX_VIEWS * MAX_VIEWS];  // [reference * MAX_VIEWS + source]: source from reference
 };
@@ -24,11 +26,15 @@ struct MatchParameters {
 struct PassParameters {
   int reference;   // view whose pixels are updated
   uint sources;    // bit j: view j is a source
-  int other;       // the one view that a transfer reads from
+  int other;       // the one view that a transfer or a change of level reads from
   int iteration;   // counts over the whole schedule of this view
   int colour;      // 0, 1: checkerboard; -1: all pixels
   int neighbours;  // bits: left, right, up, down
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried
+  float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
+  float step_normal;  // adaptive search: largest change of a unit normal's coordinates
+  int steps;          // sweep: inverse distances; regression: radius in pixels
 };

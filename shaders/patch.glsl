@@ -123,6 +123,20 @@ FN float zncc_cost(float n, float sum_a, float sum_b, float sum_aa, float sum_bb
   return 1.0f - clamp(covariance / scale, -1.0f, 1.0f);
 }
 
+#define PATTERN_CHECKERBOARD 1
+#define COLUMN_STEP (PATTERN == PATTERN_CHECKERBOARD ? 2 : 1)
+
+// First column of a patch's row: on the checkerboard the centre is a sample.
+FN int first_column(CONTEXT_ARGUMENT int row) {
+  return -WINDOW_RADIUS + (PATTERN == PATTERN_CHECKERBOARD ? (WINDOW_RADIUS + row) & 1 : 0);
+}
+
+// Weight of a sample whose intensity differs from the centre's by `difference`.
+FN float sample_weight(CONTEXT_ARGUMENT float difference) {
+  if (WEIGHTED == 0) return 1.0f;
+  return exp(-abs(difference) * PARAMETERS.support.x);
+}
+
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
 FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   int reference = PASS.reference;
@@ -138,6 +152,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return INVALID_COST;
   if (!sample_image(CONTEXT source, camera.size, centre, centre_b)) return INVALID_COST;
   float centre_a = intensity_at(CONTEXT reference, pixel);
+  if (centre_a < 0.0f) return INVALID_COST;
 
   PatchMap map;
   if (WARP != WARP_EXACT) {
@@ -152,12 +167,14 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_bb = 0.0f;
   float sum_ab = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-    for (int dx = -WINDOW_RADIUS; dx <= WINDOW_RADIUS; ++dx) {
+    for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
       if (!in_image(size, q)) continue;
       float a = intensity_at(CONTEXT reference, q);
       if (a < 0.0f) continue;
-      of_patch += 1.0f;
+      a -= centre_a;
+      float weight = sample_weight(CONTEXT a);
+      of_patch += weight;
       vec2 position;
       if (WARP == WARP_EXACT) {
         vec4 ray = ray_at(CONTEXT reference, q);
@@ -167,14 +184,15 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       }
       float b;
       if (!sample_image(CONTEXT source, camera.size, position, b)) continue;
-      a -= centre_a;
       b -= centre_b;
-      n += 1.0f;
-      sum_a += a;
-      sum_b += b;
-      sum_aa += a * a;
-      sum_bb += b * b;
-      sum_ab += a * b;
+      float weighted_a = weight * a;
+      float weighted_b = weight * b;
+      n += weight;
+      sum_a += weighted_a;
+      sum_b += weighted_b;
+      sum_aa += weighted_a * a;
+      sum_bb += weighted_b * b;
+      sum_ab += weighted_a * b;
     }
   }
   if (n < PARAMETERS.patch_limits.y * of_patch) return INVALID_COST;

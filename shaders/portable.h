@@ -8,7 +8,7 @@
 //   float intensity_at(view, pixel)         [0, 1], negative where masked
 //   vec4  intensity_taps(view, pixel)       of pixel, its right, lower and lower right neighbour
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
-//   ... and the blocks PARAMETERS and PASS of parameters.glsl.
+//   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl.
 #ifndef WIDESTEREO_PORTABLE_H
 #define WIDESTEREO_PORTABLE_H
 

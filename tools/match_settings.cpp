@@ -5,6 +5,7 @@
 
 using widestereo::DistanceSampling;
 using widestereo::Options;
+using widestereo::PatchPattern;
 using widestereo::PatchWarp;
 using widestereo::Propagation;
 
@@ -58,9 +59,24 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--propagation", propagation, "Order of pixels: checkerboard, or raster (CPU only)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Propagation>{
           {"checkerboard", Propagation::checkerboard}, {"raster", Propagation::raster}}));
-  add("--iterations", first_iterations, "Iterations of the first view");
-  add("--second-iterations", second_iterations, "Iterations of every further view");
-  add("--refinements", refinements, "Random perturbations per pixel and iteration");
+  add("--iterations", first_iterations, "Preset paper: iterations of the first view");
+  add("--second-iterations", second_iterations, "Preset paper: iterations of every further view");
+  add("--refinements", refinements, "Preset paper: random perturbations per pixel and iteration");
+  add("--pattern", pattern, "Pixels of a patch that are compared: dense or checkerboard")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, PatchPattern>{
+          {"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
+  add("--weight-scale", weight_scale, "Intensity scale of patch weights, grey levels; 0 = none");
+  add("--levels", levels, "Levels of the image pyramid");
+  add("--sweep-steps", sweep_steps, "Inverse distances tried at the coarsest level");
+  add("--level-iterations", level_iterations, "Iterations of each level, coarsest first")
+      ->delimiter(',');
+  add("--level-regressions", level_regressions, "Plane regressions of each level, coarsest first")
+      ->delimiter(',');
+  add("--regression-radius", regression_radius, "Radius of the plane regression, pixels");
+  add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
+  add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
+  add("--step-normal", step_normal, "First perturbation of a unit normal");
+  add("--source-planes", source_planes, "Try the source views' own planes: true or false");
   add("--best-sources", best_sources, "Cost = mean over this many best source views");
   add("--min-texture", min_texture, "Smallest standard deviation of a patch, grey levels of 255");
   add("--min-visible", min_visible, "Share of a patch that must be seen in the source");
@@ -90,6 +106,17 @@ Options MatchSettings::options() const {
   take(options.first_iterations, first_iterations);
   take(options.second_iterations, second_iterations);
   take(options.refinements, refinements);
+  take(options.pattern, pattern);
+  take(options.weight_scale, weight_scale);
+  take(options.levels, levels);
+  take(options.sweep_steps, sweep_steps);
+  take(options.level_iterations, level_iterations);
+  take(options.level_regressions, level_regressions);
+  take(options.regression_radius, regression_radius);
+  take(options.regression_scale, regression_scale);
+  take(options.step_pixels, step_pixels);
+  take(options.step_normal, step_normal);
+  take(options.source_planes, source_planes);
   take(options.best_sources, best_sources);
   take(options.min_texture, min_texture);
   take(options.min_visible, min_visible);

@@ -5,19 +5,25 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "widestereo/device.h"
 #include "widestereo/options.h"
 
 /// Values given on the command line; the rest comes from the preset.
 struct MatchSettings {
-  std::string preset = "paper";
+  std::string preset = "fast";
   widestereo::DeviceRequest device;
   std::optional<double> min_distance, max_distance;
   std::optional<int> window_radius, first_iterations, second_iterations, refinements, best_sources;
   std::optional<std::uint32_t> seed;
   std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt;
   std::optional<double> consistency_relative, consistency_pixels;
+  std::optional<int> levels, sweep_steps, regression_radius;
+  std::optional<double> weight_scale, regression_scale, step_pixels, step_normal;
+  std::optional<bool> source_planes;
+  std::optional<std::vector<int>> level_iterations, level_regressions;
+  std::optional<widestereo::PatchPattern> pattern;
   std::optional<widestereo::PatchWarp> warp;
   std::optional<widestereo::DistanceSampling> sampling;
   std::optional<widestereo::Propagation> propagation;

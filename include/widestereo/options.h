@@ -26,6 +26,19 @@ enum class Propagation : int {
   raster = 1,        ///< the paper's sequential order; CPU only
 };
 
+/// Which pixels of a patch are compared (values of the kernels, shaders/patch.glsl).
+enum class PatchPattern : int {
+  dense = 0,         ///< all
+  checkerboard = 1,  ///< every other one
+};
+
+/// How planes are found.
+enum class SearchMethod : int {
+  random = 0,  ///< the paper's: random planes, four neighbours, halved random perturbations
+  pyramid =
+      1,  ///< sphere sweep, coarse to fine, strips in eight directions, local plane regression
+};
+
 /// Parameters of a match. Start from a preset and change what you need.
 struct Options {
   std::string preset = "paper";
@@ -33,6 +46,7 @@ struct Options {
   double max_distance = 50;   ///< metres along the ray, > min_distance, finite
   std::uint32_t seed = 1;
 
+  SearchMethod search = SearchMethod::random;
   int window_radius = 5;  ///< patch of (2 r + 1)^2 pixels, 1..15
   PatchWarp warp = PatchWarp::exact;
   DistanceSampling sampling = DistanceSampling::uniform;
@@ -41,7 +55,23 @@ struct Options {
   int second_iterations = 8;  ///< of every further view, started from the first one's planes, >= 0
   int refinements =
       4;  ///< random perturbations per pixel and iteration, 0..16; range halved each time
-  int best_sources = 1;      ///< cost = mean of this many best source views, >= 1
+  int best_sources = 1;  ///< cost = mean of this many best source views, >= 1
+  PatchPattern pattern = PatchPattern::dense;
+  /// Weight exp(-|difference| / scale) of a sample whose intensity differs from the centre's, grey
+  /// levels of 255; 0 = all weigh the same.
+  double weight_scale = 0;
+
+  /// Of SearchMethod::pyramid.
+  int levels = 3;                                 ///< each half the size of the finer one, 1..4
+  int sweep_steps = 64;                           ///< inverse distances tried at the coarsest level
+  std::vector<int> level_iterations = {3, 2, 1};  ///< coarsest level first, one for each level
+  std::vector<int> level_regressions = {1, 1, 2};  ///< rounds of plane regression, likewise
+  int regression_radius = 12;                      ///< pixels
+  double regression_scale = 15;  ///< intensity scale of the regression's weights, grey levels
+  double step_pixels = 1;        ///< first perturbation, source pixels; halved each iteration
+  double step_normal = 0.5;      ///< first perturbation of a unit normal; halved each iteration
+  bool source_planes = true;     ///< try the planes that the source views hold
+
   double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation
                              ///< carry no information
   double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0..1
@@ -53,7 +83,7 @@ struct Options {
   double min_parallax = 0.5;  ///< pixels between min_distance and max_distance in the source view
   double max_tilt = 85;       ///< degrees between the normal and the viewing ray, 0..90
 
-  /// Throws Error for an unknown name. Presets: "paper".
+  /// Throws Error for an unknown name. Presets: "fast", "quality", "paper".
   static Options preset_named(const std::string& name);
   static std::vector<std::string> preset_names();
 };

@@ -18,10 +18,21 @@ using PixelFunction = void (*)(const Context&, ivec2);
 
 /// Entry points by Kernel; iterate and iterate_raster differ only in the order of pixels.
 constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
-    kernel::cpu::initialise_pixel,       kernel::cpu::iterate_pixel,
-    kernel::cpu::iterate_pixel,          kernel::cpu::transfer_clear_pixel,
-    kernel::cpu::transfer_nearest_pixel, kernel::cpu::transfer_winner_pixel,
-    kernel::cpu::transfer_gather_pixel,  kernel::cpu::check_pixel};
+    kernel::cpu::initialise_pixel,
+    kernel::cpu::iterate_pixel,
+    kernel::cpu::iterate_pixel,
+    kernel::cpu::transfer_clear_pixel,
+    kernel::cpu::transfer_nearest_pixel,
+    kernel::cpu::transfer_winner_pixel,
+    kernel::cpu::transfer_gather_pixel,
+    kernel::cpu::check_pixel,
+    kernel::cpu::downsample_pixel,
+    kernel::cpu::sweep_pixel,
+    kernel::cpu::upsample_pixel,
+    kernel::cpu::search_pixel,
+    kernel::cpu::measure_pixel,
+    kernel::cpu::regress_pixel,
+    kernel::cpu::adopt_pixel};
 
 class CpuBackend final : public Backend {
  public:
@@ -32,7 +43,8 @@ class CpuBackend final : public Backend {
       views_[i].intensities.create(sizes[i]);
       views_[i].hypotheses.create(sizes[i]);
       views_[i].checks.create(sizes[i]);
-      bytes_ += static_cast<std::size_t>(sizes[i].area()) * (3 * sizeof(cv::Vec4f) + sizeof(float));
+      views_[i].priors.create(sizes[i]);
+      bytes_ += static_cast<std::size_t>(sizes[i].area()) * (4 * sizeof(cv::Vec4f) + sizeof(float));
       largest = {std::max(largest.width, sizes[i].width),
                  std::max(largest.height, sizes[i].height)};
     }

@@ -17,6 +17,7 @@ struct ViewMemory {
   cv::Mat_<float> intensities;
   cv::Mat_<cv::Vec4f> hypotheses;
   cv::Mat_<cv::Vec4f> checks;
+  cv::Mat_<cv::Vec4f> priors;
 };
 
 /// What a kernel sees besides its pixel.
@@ -33,6 +34,8 @@ struct Context {
 #define WARP context.constants.warp
 #define SOURCE_MODEL context.constants.source_model
 #define VIEW_COUNT context.constants.view_count
+#define PATTERN context.constants.pattern
+#define WEIGHTED context.constants.weighted
 
 inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 
@@ -47,14 +50,29 @@ inline vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   const float* bottom = &context.views[view].intensities(p.y + 1, p.x);
   return {top[0], top[1], bottom[0], bottom[1]};
 }
+inline void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
+  context.views[view].intensities(p.y, p.x) = intensity;
+}
+inline void store(cv::Mat_<cv::Vec4f>& map, ivec2 p, vec4 v) {
+  map(p.y, p.x) = {v.x, v.y, v.z, v.w};
+}
 inline vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return to_vec4(context.views[view].hypotheses(p.y, p.x));
 }
 inline void store_hypothesis(CONTEXT_ARGUMENT int view, ivec2 p, vec4 h) {
-  context.views[view].hypotheses(p.y, p.x) = {h.x, h.y, h.z, h.w};
+  store(context.views[view].hypotheses, p, h);
+}
+inline vec4 check_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return to_vec4(context.views[view].checks(p.y, p.x));
 }
 inline void store_check(CONTEXT_ARGUMENT int view, ivec2 p, vec4 c) {
-  context.views[view].checks(p.y, p.x) = {c.x, c.y, c.z, c.w};
+  store(context.views[view].checks, p, c);
+}
+inline vec4 prior_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return to_vec4(context.views[view].priors(p.y, p.x));
+}
+inline void store_prior(CONTEXT_ARGUMENT int view, ivec2 p, vec4 m) {
+  store(context.views[view].priors, p, m);
 }
 
 inline std::atomic_ref<uint> atomic_at(cv::Mat_<int>& buffer, ivec2 p) {
@@ -89,6 +107,9 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "plane.glsl"
 #include "patch.glsl"
 #include "search.glsl"
+#include "pyramid.glsl"
+#include "adaptive_search.glsl"
+#include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"
 // clang-format on

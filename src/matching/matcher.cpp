@@ -78,7 +78,7 @@ class Matcher::Implementation {
           "device \"cpu\" or checkerboard propagation.");
     }
     std::vector<cv::Size> sizes;
-    for (const View& view : rig_.views) {
+    for (const View& view : schedule_.views) {
       sizes.emplace_back(view.camera.width, view.camera.height);
       rays_.push_back(ray_image(view.camera, view.mask));
     }

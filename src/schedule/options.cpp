@@ -14,6 +14,10 @@ NLOHMANN_JSON_SERIALIZE_ENUM(PatchWarp, {{PatchWarp::exact, "exact"},
                                          {PatchWarp::quadratic, "quadratic"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(DistanceSampling, {{DistanceSampling::uniform, "uniform"},
                                                 {DistanceSampling::inverse, "inverse"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(PatchPattern, {{PatchPattern::dense, "dense"},
+                                            {PatchPattern::checkerboard, "checkerboard"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(SearchMethod,
+                             {{SearchMethod::random, "random"}, {SearchMethod::pyramid, "pyramid"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Propagation, {{Propagation::checkerboard, "checkerboard"},
                                            {Propagation::raster, "raster"}})
 
@@ -28,13 +32,33 @@ void require_between(double value, double low, double high, const std::string& n
 
 Options Options::preset_named(const std::string& name) {
   Options options;
+  options.preset = name;
   if (name == "paper") return options;
+  options.search = SearchMethod::pyramid;
+  options.warp = PatchWarp::affine;
+  options.sampling = DistanceSampling::inverse;
+  options.weight_scale = 25;
+  options.min_texture = 0;
+  if (name == "fast") {
+    options.pattern = PatchPattern::checkerboard;
+    options.sweep_steps = 30;
+    options.level_iterations = {2, 2, 1};
+    options.level_regressions = {1, 1, 2};
+    options.source_planes = false;
+    return options;
+  }
+  if (name == "quality") {
+    options.sweep_steps = 128;
+    options.level_iterations = {4, 3, 2};
+    options.level_regressions = {1, 2, 3};
+    return options;
+  }
   std::string known;
   for (const std::string& preset : preset_names()) known += " \"" + preset + "\"";
   throw Error("There is no preset \"" + name + "\"; choose one of" + known + ".");
 }
 
-std::vector<std::string> Options::preset_names() { return {"paper"}; }
+std::vector<std::string> Options::preset_names() { return {"fast", "quality", "paper"}; }
 
 void validate(const Options& o) {
   if (!std::isfinite(o.min_distance) || !std::isfinite(o.max_distance) || o.min_distance <= 0 ||
@@ -49,6 +73,22 @@ void validate(const Options& o) {
   require_between(o.second_iterations, 0, 100000, "second iterations");
   require_between(o.refinements, 0, 16, "refinements");
   require_between(o.best_sources, 1, 8, "best sources");
+  require_between(o.weight_scale, 0, 10000, "weight scale");
+  require_between(o.levels, 1, 4, "levels");
+  require_between(o.sweep_steps, 1, 10000, "sweep steps");
+  for (const auto& [values, name] : {std::pair(&o.level_iterations, "level iterations"),
+                                     std::pair(&o.level_regressions, "level regressions")}) {
+    if (static_cast<int>(values->size()) != o.levels) {
+      throw Error(std::string("The option ") + name + " has " + std::to_string(values->size()) +
+                  " numbers; give one for each of the " + std::to_string(o.levels) +
+                  " levels, coarsest first.");
+    }
+    for (const int value : *values) require_between(value, 0, 1000, name);
+  }
+  require_between(o.regression_radius, 2, 64, "regression radius");
+  require_between(o.regression_scale, 0.1, 10000, "regression scale");
+  require_between(o.step_pixels, 0, 1000, "step pixels");
+  require_between(o.step_normal, 0, 2, "step normal");
   require_between(o.min_texture, 0, 255, "min texture");
   require_between(o.min_visible, 0, 1, "min visible");
   require_between(o.consistency_relative, 0, 1000, "consistency (relative)");
@@ -63,7 +103,19 @@ std::string to_json(const Options& o) {
                                        {"min_distance", o.min_distance},
                                        {"max_distance", o.max_distance},
                                        {"seed", o.seed},
+                                       {"search", o.search},
                                        {"window_radius", o.window_radius},
+                                       {"pattern", o.pattern},
+                                       {"weight_scale", o.weight_scale},
+                                       {"levels", o.levels},
+                                       {"sweep_steps", o.sweep_steps},
+                                       {"level_iterations", o.level_iterations},
+                                       {"level_regressions", o.level_regressions},
+                                       {"regression_radius", o.regression_radius},
+                                       {"regression_scale", o.regression_scale},
+                                       {"step_pixels", o.step_pixels},
+                                       {"step_normal", o.step_normal},
+                                       {"source_planes", o.source_planes},
                                        {"warp", o.warp},
                                        {"sampling", o.sampling},
                                        {"propagation", o.propagation},

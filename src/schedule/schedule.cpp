@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "schedule/schedule.h"
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 
@@ -11,6 +13,7 @@
 namespace widestereo {
 namespace {
 
+constexpr std::size_t most_views = 8;
 constexpr int all_neighbours = 15;
 constexpr int left_and_up = 1 | 4;
 constexpr int right_and_down = 2 | 8;
@@ -18,9 +21,10 @@ constexpr int right_and_down = 2 | 8;
 // The blocks are uploaded as they are: their layout must be std140 (parameters) and std430 (pass).
 static_assert(sizeof(kernel::CameraParameters) == 80);
 static_assert(sizeof(kernel::ViewPair) == 48);
-static_assert(offsetof(kernel::MatchParameters, cameras) == 64);
-static_assert(offsetof(kernel::MatchParameters, pairs) == 64 + 80 * MAX_VIEWS);
-static_assert(sizeof(kernel::PassParameters) == 36);
+static_assert(offsetof(kernel::MatchParameters, cameras) == 80);
+static_assert(offsetof(kernel::MatchParameters, pairs) == 80 + 80 * MAX_VIEWS);
+static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
+static_assert(sizeof(kernel::PassParameters) == 52);
 
 kernel::ViewPair view_pair(const View& source, const View& reference) {
   const Eigen::Matrix<float, 3, 4> t =
@@ -29,7 +33,7 @@ kernel::ViewPair view_pair(const View& source, const View& reference) {
   return {row(0), row(1), row(2)};
 }
 
-kernel::MatchParameters match_parameters(const Rig& rig, const Options& options) {
+kernel::MatchParameters match_parameters(const std::vector<View>& all, const Options& options) {
   constexpr double degree = std::numbers::pi / 180;
   const auto single = [](double value) { return static_cast<float>(value); };
   kernel::MatchParameters p{};
@@ -39,54 +43,138 @@ kernel::MatchParameters match_parameters(const Rig& rig, const Options& options)
                     single(std::cos(options.max_tilt * degree)), 0};
   p.check_limits = {single(options.consistency_relative), single(options.consistency_pixels),
                     single(options.max_cost), single(options.min_parallax)};
-  const int views = static_cast<int>(rig.views.size());
+  const auto inverse_scale = [](double grey_levels) {
+    return grey_levels > 0 ? static_cast<float>(255 / grey_levels) : 0.0f;
+  };
+  p.support = {inverse_scale(options.weight_scale), inverse_scale(options.regression_scale), 0, 0};
+  const int views = static_cast<int>(all.size());
   p.search = {static_cast<int>(options.sampling), options.refinements, options.best_sources, views};
   for (int i = 0; i < views; ++i) {
-    p.cameras[i] = kernel_camera(rig.views[i].camera);
+    p.cameras[i] = kernel_camera(all[i].camera);
     for (int j = 0; j < views; ++j) {
-      p.pairs[i * MAX_VIEWS + j] = view_pair(rig.views[j], rig.views[i]);
+      p.pairs[i * MAX_VIEWS + j] = view_pair(all[j], all[i]);
     }
   }
   return p;
 }
 
+/// The camera of an image downsampled by averaging 2x2 pixels; an odd side keeps a last, partial
+/// pixel.
+View halved(const View& view) {
+  View half = view;
+  Camera& camera = half.camera;
+  camera.width = (camera.width + 1) / 2;
+  camera.height = (camera.height + 1) / 2;
+  for (double* scaled : {&camera.fx, &camera.fy, &camera.skew}) *scaled *= 0.5;
+  for (double* centre : {&camera.cx, &camera.cy}) *centre = 0.5 * (*centre + 0.5) - 0.5;
+  half.mask = cv::Mat();  // masked pixels arrive with the intensities
+  return half;
+}
+
+/// The rig's views at `levels` levels, finest first.
+std::vector<View> pyramid(const Rig& rig, int levels) {
+  std::vector<View> views = rig.views;
+  for (int level = 1; level < levels; ++level) {
+    for (std::size_t i = 0; i < rig.views.size(); ++i) {
+      views.push_back(halved(views[views.size() - rig.views.size()]));
+    }
+  }
+  return views;
+}
+
+// Candidate kinds of shaders/adaptive_search.glsl.
+constexpr unsigned strips = 0xff;
+constexpr unsigned inverse_distance = 1u << 8;
+constexpr unsigned both = 1u << 10;
+constexpr unsigned random_distance = 1u << 11;
+constexpr unsigned surroundings = 1u << 12;
+constexpr unsigned source_planes = 1u << 13;
+constexpr unsigned normal = 1u << 9;
+
 /// Appends the dispatches of one schedule.
 class Builder {
  public:
-  Builder(const Rig& rig, const Options& options) : rig_(rig), options_(options) {
+  Builder(const Rig& rig, const Options& options) : options_(options) {
+    const bool is_pyramid = options.search == SearchMethod::pyramid;
+    levels_ = is_pyramid ? options.levels : 1;
+    views_of_rig_ = static_cast<int>(rig.views.size());
+    schedule_.views = pyramid(rig, levels_);
+    if (schedule_.views.size() > MAX_VIEWS) {
+      throw Error("The rig has " + std::to_string(views_of_rig_) + " views, too many for " +
+                  std::to_string(levels_) + " levels (" + std::to_string(MAX_VIEWS) +
+                  " in all); choose fewer views or levels.");
+    }
     schedule_.constants = {.source_model = common_model(),
                            .window_radius = options.window_radius,
                            .warp = static_cast<int>(options.warp),
-                           .view_count = static_cast<int>(rig.views.size())};
-    schedule_.parameters = match_parameters(rig, options);
+                           .view_count = static_cast<int>(schedule_.views.size()),
+                           .pattern = static_cast<int>(options.pattern),
+                           .weighted = options.weight_scale > 0 ? 1 : 0};
+    schedule_.parameters = match_parameters(schedule_.views, options);
   }
 
   Schedule build() {
-    const int views = schedule_.constants.view_count;
-    start_at_random(0);
-    iterate(0, options_.first_iterations);
-    for (int view = 1; view < views; ++view) {
-      start_from(view, 0);
-      iterate(view, options_.second_iterations);
+    if (options_.search == SearchMethod::pyramid) {
+      build_pyramid();
+    } else {
+      build_random();
     }
-    for (int view = 0; view < views; ++view) add(Kernel::check, pass_of(view), view, 0);
+    for (int view = 0; view < views_of_rig_; ++view) add(Kernel::check, pass_of(view), view, 0);
     return std::move(schedule_);
   }
 
  private:
+  void build_random() {
+    start_at_random(0);
+    iterate(0, options_.first_iterations);
+    for (int view = 1; view < views_of_rig_; ++view) {
+      start_from(view, 0);
+      iterate(view, options_.second_iterations);
+    }
+  }
+
+  void build_pyramid() {
+    for (int level = 1; level < levels_; ++level) {
+      for (const int view : views_of(level)) add_between_levels(Kernel::downsample, view, -1, 0);
+    }
+    for (int level = levels_ - 1; level >= 0; --level) {
+      for (const int view : views_of(level)) {
+        if (level == levels_ - 1) {
+          sweep(view);
+        } else {
+          add_between_levels(Kernel::upsample, view, +1, 4);
+        }
+      }
+      const int place = levels_ - 1 - level;
+      for (int i = 0; i < options_.level_iterations[place]; ++i) {
+        const bool first = i == 0 && level == levels_ - 1;
+        for (const int view : views_of(level)) search(view, i, first);
+      }
+      for (int i = 0; i < options_.level_regressions[place]; ++i) {
+        for (const int view : views_of(level)) regress(view, level);
+      }
+    }
+  }
+
+  std::vector<int> views_of(int level) const {
+    std::vector<int> views;
+    for (int i = 0; i < views_of_rig_; ++i) views.push_back(level * views_of_rig_ + i);
+    return views;
+  }
+
   int common_model() const {
-    const CameraModel model = rig_.views.front().camera.model;
-    for (const View& view : rig_.views) {
+    const CameraModel model = schedule_.views.front().camera.model;
+    for (const View& view : schedule_.views) {
       if (view.camera.model != model) return -1;
     }
     return static_cast<int>(model);
   }
 
   kernel::PassParameters pass_of(int view) const {
-    const unsigned all_views = (1u << rig_.views.size()) - 1;
+    const unsigned of_level = ((1u << views_of_rig_) - 1) << (view / views_of_rig_ * views_of_rig_);
     kernel::PassParameters pass{};
     pass.reference = view;
-    pass.sources = all_views & ~(1u << view);
+    pass.sources = of_level & ~(1u << view);
     pass.other = view;
     pass.iteration = 0;
     pass.colour = -1;
@@ -97,15 +185,18 @@ class Builder {
 
   /// `over`: the view whose pixels the kernel runs over; `patches`: evaluated per pixel.
   void add(Kernel kernel, kernel::PassParameters pass, int over, int patches) {
-    const Camera& camera = rig_.views[over].camera;
-    const long long window = 2 * options_.window_radius + 1;
-    const long long sources = static_cast<long long>(rig_.views.size()) - 1;
+    const Camera& camera = schedule_.views[over].camera;
     const long long pixels = static_cast<long long>(camera.width) * camera.height;
     pass.first_row = 0;
     pass.last_row = camera.height;
     schedule_.dispatches.push_back(
         {kernel, pass, camera.width, camera.height,
-         pixels / (pass.colour < 0 ? 1 : 2) * patches * sources * window * window});
+         pixels / (pass.colour < 0 ? 1 : 2) * patches * (views_of_rig_ - 1) * samples_of_patch()});
+  }
+
+  long long samples_of_patch() const {
+    const long long side = 2 * options_.window_radius + 1;
+    return options_.pattern == PatchPattern::checkerboard ? (side * side + 1) / 2 : side * side;
   }
 
   void start_at_random(int view) { add(Kernel::initialise, pass_of(view), view, 1); }
@@ -135,8 +226,48 @@ class Builder {
     }
   }
 
-  const Rig& rig_;
+  /// `step`: +1 takes from the coarser level, -1 from the finer one.
+  void add_between_levels(Kernel kernel, int view, int step, int patches) {
+    kernel::PassParameters pass = pass_of(view);
+    pass.other = view + step * views_of_rig_;
+    add(kernel, pass, view, patches);
+  }
+
+  void sweep(int view) {
+    kernel::PassParameters pass = pass_of(view);
+    pass.steps = options_.sweep_steps;
+    add(Kernel::sweep, pass, view, options_.sweep_steps);
+  }
+
+  void search(int view, int iteration, bool first) {
+    kernel::PassParameters pass = pass_of(view);
+    pass.iteration = iteration + 1;
+    pass.candidates = strips | inverse_distance | both | surroundings;
+    if (options_.pattern == PatchPattern::dense) pass.candidates |= normal;
+    if (first) pass.candidates |= random_distance;
+    if (options_.source_planes && !first) pass.candidates |= source_planes;
+    const double share = std::pow(0.5, iteration);
+    pass.step_pixels = static_cast<float>(options_.step_pixels * share);
+    pass.step_normal = static_cast<float>(options_.step_normal * share);
+    for (int colour = 0; colour < 2; ++colour) {
+      pass.colour = colour;
+      add(Kernel::search, pass, view, std::popcount(pass.candidates));
+    }
+  }
+
+  void regress(int view, int level) {
+    kernel::PassParameters pass = pass_of(view);
+    // Two thirds at coarse levels, where a pixel covers more of the scene.
+    pass.steps =
+        level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius * 2 / 3);
+    add(Kernel::measure, pass, view, 0);
+    add(Kernel::regress, pass, view, 0);
+    add(Kernel::adopt, pass, view, 1);
+  }
+
   const Options& options_;
+  int levels_ = 1;
+  int views_of_rig_ = 2;
   Schedule schedule_;
 };
 
@@ -144,8 +275,9 @@ class Builder {
 
 const char* to_string(Kernel kernel) {
   static constexpr std::array<const char*, kernel_count> names = {
-      "initialise",       "iterate",         "iterate_raster",  "transfer_clear",
-      "transfer_nearest", "transfer_winner", "transfer_gather", "check"};
+      "initialise",      "iterate",         "iterate_raster", "transfer_clear", "transfer_nearest",
+      "transfer_winner", "transfer_gather", "check",          "downsample",     "sweep",
+      "upsample",        "search",          "measure",        "regress",        "adopt"};
   return names[static_cast<std::size_t>(kernel)];
 }
 

@@ -21,8 +21,15 @@ enum class Kernel {
   transfer_winner,   ///< ... smallest pixel index among the nearest ones
   transfer_gather,   ///< ... takes over the winner's plane, or a random one where there is none
   check,             ///< consistency, reasons and confidence of a view
+  downsample,        ///< intensities of a view from those one level finer
+  sweep,             ///< fronto-spherical planes over the whole range of inverse distances
+  upsample,          ///< planes of a view from those one level coarser
+  search,            ///< one colour: candidates of eight strips, then refinement in source pixels
+  measure,           ///< how precisely each pixel is matched (kept where the checks go)
+  regress,           ///< precision-weighted plane of each pixel's neighbourhood
+  adopt,             ///< takes those planes over
 };
-inline constexpr int kernel_count = 8;
+inline constexpr int kernel_count = 15;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).
@@ -30,7 +37,9 @@ struct KernelConstants {
   int source_model = -1;  ///< the sources' camera model when all agree, else -1
   int window_radius = 5;
   int warp = 0;
-  int view_count = 2;
+  int view_count = 2;  ///< at all levels
+  int pattern = 0;
+  int weighted = 0;
   bool operator==(const KernelConstants&) const = default;
 };
 
@@ -48,6 +57,8 @@ struct Schedule {
   KernelConstants constants;
   kernel::MatchParameters parameters{};
   std::vector<Dispatch> dispatches;
+  /// The rig's views at full size, then at half of it, and so on: what a back end keeps memory for.
+  std::vector<View> views;
 };
 
 /// Throws Error when rig or options are invalid, or there are fewer than 2 or more than MAX_VIEWS

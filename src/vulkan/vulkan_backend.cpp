@@ -123,8 +123,8 @@ VulkanBackend::~VulkanBackend() = default;
 void VulkanBackend::make_images(const VulkanContext& context) {
   const cv::Size size = largest(sizes_);
   const int layers = static_cast<int>(sizes_.size());
-  const auto make_map = [&](const char* purpose) {
-    return make_image(context, map_format, size, layers,
+  const auto make_map = [&](int layers_of_map, const char* purpose) {
+    return make_image(context, map_format, size, layers_of_map,
                       VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
                           VK_IMAGE_USAGE_TRANSFER_DST_BIT,
                       purpose);
@@ -133,9 +133,9 @@ void VulkanBackend::make_images(const VulkanContext& context) {
       context, intensity_format, size, layers,
       VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
       "the images");
-  rays_ = make_map("the viewing rays");
-  hypotheses_ = make_map("the planes");
-  checks_ = make_map("the consistency maps");
+  rays_ = make_map(layers, "the viewing rays");
+  hypotheses_ = make_map(2 * layers, "the planes and their priors");
+  checks_ = make_map(layers, "the consistency maps");
   parameters_ = make_device_buffer(
       context, sizeof(kernel::MatchParameters),
       VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the parameters");
@@ -213,9 +213,10 @@ void VulkanBackend::make_descriptor_set() {
 
 void VulkanBackend::clear_images() {
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange all = layers_of(0, sizes_.size());
   const VkClearColorValue zero{};
   for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
+    const VkImageSubresourceRange all =
+        layers_of(0, image == &hypotheses_ ? 2 * sizes_.size() : sizes_.size());
     transition(commands, *image, all, VK_IMAGE_LAYOUT_UNDEFINED,
                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
     context_.vk().vkCmdClearColorImage(commands, image->handle.get(),

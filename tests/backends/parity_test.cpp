@@ -122,6 +122,31 @@ TEST_P(Parity, WholeMatchAgrees) {
   expect_no_validation_messages(*device);
 }
 
+TEST_P(Parity, PyramidMatchAgrees) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Device cpu = Device::open("cpu");
+  const RenderedPair pair = render_demo(129);  // odd: levels with partial last pixels
+  for (const char* preset : {"fast", "quality"}) {
+    Options options = Options::preset_named(preset);
+    std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+    options.sweep_steps = 24;
+    const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
+    const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
+    for (int view = 0; view < 2; ++view) {
+      const ViewResult& e = expected.views[view];
+      const ViewResult& a = actual.views[view];
+      const cv::Mat sure = (e.reasons == 0) & (a.reasons == 0);
+      cv::Mat difference;
+      cv::absdiff(e.distance, a.distance, difference);
+      cv::divide(difference, e.distance, difference);
+      const double agreeing = cv::countNonZero((difference <= 0.005) & sure);
+      EXPECT_GT(cv::countNonZero(sure), 0.3 * static_cast<double>(sure.total())) << preset;
+      EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97) << preset;
+    }
+  }
+  expect_no_validation_messages(*device);
+}
+
 INSTANTIATE_TEST_SUITE_P(Devices, Parity, ::testing::ValuesIn(other_devices));
 
 class EveryDevice : public ::testing::TestWithParam<const char*> {};
@@ -225,6 +250,29 @@ TEST_P(EveryDevice, RejectsWhatItCannotMatch) {
     bad.propagation = Propagation::raster;
     EXPECT_THROW(Matcher(*device, pair.rig, bad), Error);
   }
+}
+
+TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const RenderedPair pair = render_demo(128);
+  const auto scores_of = [&](const StereoResult& result) {
+    return evaluate(result.views[0].distance, result.views[0].normals, pair.views[0].truth,
+                    pair.rig.views[0], pair.rig.views[1])[1];
+  };
+  Options random = small_options(pair);
+  random.window_radius = 5;
+  random.first_iterations = 8;
+  Options fast = Options::preset_named("fast");
+  std::tie(fast.min_distance, fast.max_distance) = demo_distance_range();
+  const StereoResult of_random = Matcher(*device, pair.rig, random).match(images_of(pair));
+  const StereoResult of_fast = Matcher(*device, pair.rig, fast).match(images_of(pair));
+  EXPECT_LT(of_fast.samples, of_random.samples / 2);
+  EXPECT_LT(scores_of(of_fast).median_relative, scores_of(of_random).median_relative);
+  EXPECT_LT(scores_of(of_fast).bad_pixels.at(1.0), scores_of(of_random).bad_pixels.at(1.0));
+  EXPECT_LT(scores_of(of_fast).median_normal_angle, 0.5 * scores_of(of_random).median_normal_angle);
+  const StereoResult again = Matcher(*device, pair.rig, fast).match(images_of(pair));
+  EXPECT_EQ(cv::norm(of_fast.views[0].hypotheses, again.views[0].hypotheses, cv::NORM_INF), 0);
+  expect_no_validation_messages(*device);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan"));

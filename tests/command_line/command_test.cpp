@@ -43,7 +43,7 @@ Outcome run(const std::string& arguments, const std::string& environment = "") {
 class Command : public ::testing::Test {
  protected:
   static constexpr const char* quick =
-      " --device cpu --iterations 2 --second-iterations 1 --window-radius 2"
+      " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2"
       " --min-distance 0.4 --max-distance 8 ";
 
   void SetUp() override {
@@ -96,7 +96,8 @@ cam1:
 
 TEST_F(Command, DemoScoresItself) {
   const Outcome outcome =
-      run("demo --size 96 --device cpu --iterations 6 --second-iterations 3 --window-radius 3 -o " +
+      run("demo --size 96 --preset paper --device cpu --iterations 6 --second-iterations 3 "
+          "--window-radius 3 -o " +
           file("demo"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("non-occluded"), std::string::npos);
@@ -195,8 +196,7 @@ TEST_F(Command, ImagesWithoutOverlapAreRefused) {
 TEST_F(Command, WithoutAVulkanDriverItSaysSoAndUsesTheCpu) {
   const std::string no_driver =
       "VK_ICD_FILENAMES=/nonexistent.json VK_DRIVER_FILES=/nonexistent.json";
-  const std::string arguments =
-      "demo --size 64 --iterations 1 --second-iterations 0 -o " + file("demo");
+  const std::string arguments = "demo --size 64 -o " + file("demo");
   const Outcome strict = run(arguments + " --device vulkan", no_driver);
   EXPECT_EQ(strict.exit_code, 1);
   EXPECT_NE(strict.output.find("No Vulkan device"), std::string::npos) << strict.output;

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+// Propagation from the best pixels of eight strips, and refinement in units of source pixels.
+
+#define STRIPS 8
+#define CANDIDATE_INVERSE_DISTANCE 8
+#define CANDIDATE_NORMAL 9
+#define CANDIDATE_BOTH 10
+#define CANDIDATE_RANDOM_DISTANCE 11
+#define CANDIDATE_SURROUNDINGS 12
+#define CANDIDATE_SOURCE_PLANE 13
+#define CANDIDATE_KINDS 14
+
+// Pixels away at which the surroundings of a pixel are taken for a normal.
+#define SURROUNDINGS_RADIUS 3
+
+FN int first_source(CONTEXT_ARGUMENT_ONLY) {
+  for (int source = 0; source < VIEW_COUNT; ++source) {
+    if ((PASS.sources & (1u << uint(source))) != 0u) return source;
+  }
+  return PASS.reference;
+}
+
+// Movement in the source, pixels per unit of inverse distance; zero where it cannot be measured.
+FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
+  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  float step = 0.002f * (PARAMETERS.range.w - PARAMETERS.range.z);
+  vec2 low;
+  vec2 high;
+  if (!project(camera, camera.size.z, direction_in_source(pair, ray, w - step), low) ||
+      !project(camera, camera.size.z, direction_in_source(pair, ray, w + step), high)) {
+    return vec2(0.0f, 0.0f);
+  }
+  return (0.5f / step) * (high - low);
+}
+
+// The plane of lowest cost on a strip: 7 near pixels in a V, or 11 far ones along a line up to 23 pixels
+// away, up, down, left or right. All are of the other colour, so that no thread reads what another writes.
+FN vec3 best_of_strip(CONTEXT_ARGUMENT ivec2 pixel, int strip) {
+  bool near = strip < 4;
+  int side = strip & 3;
+  float lowest = INVALID_COST;
+  vec3 best = vec3(0.0f, 0.0f, 0.0f);
+  int count = near ? 7 : 11;
+  for (int k = 0; k < count; ++k) {
+    int arm = (k + 1) / 2;
+    int along = near ? 1 + arm : 3 + 2 * k;
+    int across = near ? ((k & 1) == 1 ? -arm : arm) : 0;
+    if ((side & 1) == 0) along = -along;
+    ivec2 q = side < 2 ? ivec2(pixel.x + across, pixel.y + along)
+                       : ivec2(pixel.x + along, pixel.y + across);
+    if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
+    vec4 candidate = hypothesis_at(CONTEXT PASS.reference, q);
+    if (candidate.w < lowest) {
+      lowest = candidate.w;
+      best = vec3(candidate.x, candidate.y, candidate.z);
+    }
+  }
+  return best;
+}
+
+// The plane through the same point with a normal moved by up to PASS.step_normal (of unit length).
+FN vec3 turned_plane(CONTEXT_ARGUMENT vec3 ray, vec3 m, vec4 u) {
+  vec3 moved = (1.0f / length(m)) * m + PASS.step_normal * vec3(2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f,
+                                                                2.0f * u.z - 1.0f);
+  float facing = dot(moved, ray);
+  if (facing <= 0.0f) return m;
+  return (dot(m, ray) / facing) * moved;
+}
+
+// The plane through the pixel's point that is parallel to the surface spanned by the points around it.
+FN vec3 surroundings_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) {
+  vec3 none = vec3(0.0f, 0.0f, 0.0f);
+  vec3 points[4];
+  for (int i = 0; i < 4; ++i) {
+    int offset = (i & 1) == 0 ? -SURROUNDINGS_RADIUS : SURROUNDINGS_RADIUS;
+    ivec2 q = i < 2 ? ivec2(pixel.x + offset, pixel.y) : ivec2(pixel.x, pixel.y + offset);
+    if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) return none;
+    vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+    vec4 r = ray_at(CONTEXT PASS.reference, q);
+    float w = plane.x * r.x + plane.y * r.y + plane.z * r.z;
+    if (w <= 0.0f) return none;
+    points[i] = (1.0f / w) * vec3(r.x, r.y, r.z);
+  }
+  vec3 normal = cross(points[1] - points[0], points[3] - points[2]);
+  float facing = dot(normal, ray);
+  if (abs(facing) <= 0.05f * length(normal)) return none;
+  return (dot(m, ray) / facing) * normal;
+}
+
+// The plane that the source itself holds where the pixel's point lands in it.
+FN vec3 source_plane(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
+  vec3 none = vec3(0.0f, 0.0f, 0.0f);
+  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  vec2 position;
+  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return none;
+  ivec2 q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
+  if (!in_image(camera.size, q)) return none;
+  vec4 held = hypothesis_at(CONTEXT source, q);
+  vec3 plane = vec3(held.x, held.y, held.z);
+  ViewPair back = PARAMETERS.pairs[source * MAX_VIEWS + PASS.reference];
+  if (held.w >= INVALID_COST || side_of_source(back, plane) <= 0.0f) return none;
+  return plane_in_source(back, plane);
+}
+
+// Candidate of one kind; zero, which is never admissible, where there is none.
+FN vec3 adaptive_candidate(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float speed, int source,
+                           int kind) {
+  if (kind < STRIPS) return best_of_strip(CONTEXT pixel, kind);
+  if (kind == CANDIDATE_SURROUNDINGS) return surroundings_plane(CONTEXT pixel, ray, m);
+  if (kind == CANDIDATE_SOURCE_PLANE) return source_plane(CONTEXT source, ray, m);
+  vec4 range = PARAMETERS.range;
+  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, kind);
+  float w = dot(m, ray);
+  if (kind == CANDIDATE_RANDOM_DISTANCE) {
+    return ((range.z + u.w * (range.w - range.z)) / w) * m;
+  }
+  vec3 plane = m;
+  if (kind != CANDIDATE_INVERSE_DISTANCE) plane = turned_plane(CONTEXT ray, m, u);
+  if (kind != CANDIDATE_NORMAL) {
+    float step = PASS.step_pixels * (2.0f * u.w - 1.0f) / max(speed, 1e-6f);
+    plane = (clamp(w + step, range.z, range.w) / w) * plane;
+  }
+  return plane;
+}
+
+FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  float w = held.x * ray.x + held.y * ray.y + held.z * ray.z;
+  if (!is_usable(CONTEXT pixel, usable_ray)) return;
+  if (w <= 0.0f) held = vec4(PARAMETERS.range.z * ray, INVALID_COST);
+  int source = first_source(CONTEXT_ONLY);
+  float speed = length(source_velocity(CONTEXT source, ray, w));
+  for (int kind = 0; kind < CANDIDATE_KINDS; ++kind) {
+    if ((PASS.candidates & (1u << uint(kind))) == 0u) continue;
+    vec3 m = vec3(held.x, held.y, held.z);
+    held = better_of(CONTEXT pixel, ray, held,
+                     adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind));
+  }
+  store_hypothesis(CONTEXT PASS.reference, pixel, held);
+}

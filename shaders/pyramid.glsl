@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+// Between the levels of the image pyramid. Every view has one entry for each level, with a camera of its own;
+// PASS.other is the same view one level finer (downsample) or coarser (upsample).
+
+FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
+  return ray.w != 0.0f && intensity_at(CONTEXT PASS.reference, pixel) >= 0.0f;
+}
+
+// Mean of the four finer pixels; masked unless at least three of them are usable.
+FN void downsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  float sum = 0.0f;
+  float n = 0.0f;
+  for (int i = 0; i < 4; ++i) {
+    ivec2 q = ivec2(2 * pixel.x + (i & 1), 2 * pixel.y + (i >> 1));
+    if (!in_image(PARAMETERS.cameras[PASS.other].size, q)) continue;
+    float a = intensity_at(CONTEXT PASS.other, q);
+    if (a < 0.0f) continue;
+    sum += a;
+    n += 1.0f;
+  }
+  store_intensity(CONTEXT PASS.reference, pixel, n >= 3.0f ? sum / n : -1.0f);
+}
+
+// Starts a pixel from fronto-spherical planes at PASS.steps inverse distances over the whole range.
+FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (!is_usable(CONTEXT pixel, usable_ray)) {
+    store_no_plane(CONTEXT pixel);
+    return;
+  }
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec4 best = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
+  vec4 range = PARAMETERS.range;
+  for (int i = 0; i < PASS.steps; ++i) {
+    float share = (float(i) + 0.5f) / float(PASS.steps);
+    best = better_of(CONTEXT pixel, ray, best, (range.z + share * (range.w - range.z)) * ray);
+  }
+  store_hypothesis(CONTEXT PASS.reference, pixel, best);
+}
+
+// Starts a pixel from the best of the four nearest coarser pixels' planes: evaluated at the finer ray they
+// are exact, so slanted surfaces need no interpolation. A random plane where there is none.
+FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (!is_usable(CONTEXT pixel, usable_ray)) {
+    store_no_plane(CONTEXT pixel);
+    return;
+  }
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec4 best = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
+  for (int i = 0; i < 5; ++i) {
+    vec3 m = vec3(0.0f, 0.0f, 0.0f);
+    if (i < 4) {
+      ivec2 q = ivec2(pixel.x / 2 + (i & 1) * ((pixel.x & 1) * 2 - 1),
+                      pixel.y / 2 + (i >> 1) * ((pixel.y & 1) * 2 - 1));
+      if (!in_image(PARAMETERS.cameras[PASS.other].size, q)) continue;
+      vec4 parent = hypothesis_at(CONTEXT PASS.other, q);
+      m = vec3(parent.x, parent.y, parent.z);
+    } else if (best.w >= INVALID_COST) {
+      m = random_plane(CONTEXT pixel, ray, 0);
+    }
+    best = better_of(CONTEXT pixel, ray, best, m);
+  }
+  store_hypothesis(CONTEXT PASS.reference, pixel, best);
+}

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+// Local plane regression: inverse distance is exactly linear in the ray, so the plane of a neighbourhood is
+// a linear least-squares problem, weighted by how precisely each pixel was measured. It fills weak texture from
+// confident surroundings and makes distances sub-pixel accurate.
+
+#define UNMEASURED_VARIANCE 1e4f
+// Variance (px^2) below which no measurement is believed.
+#define SMALLEST_VARIANCE 4e-4f
+// Largest scale (px) of the robust weights.
+#define LARGEST_RESIDUAL 0.6f
+#define REGRESSION_ROUNDS 3
+// Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
+#define TANGENT_SCALE 100.0f
+
+// Direction in the reference image, per pixel of displacement along `along` (unit) in the source: the inverse of
+// the map's derivative at the pixel; `along` itself where the derivative cannot be measured.
+FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 along) {
+  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  int model = camera.size.z;
+  vec2 left;
+  vec2 right;
+  vec2 up;
+  vec2 down;
+  bool ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - 1, pixel.y), left);
+  ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + 1, pixel.y), right) && ok;
+  ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y - 1), up) && ok;
+  ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y + 1), down) && ok;
+  if (!ok) return along;
+  vec2 jx = 0.5f * (right - left);
+  vec2 jy = 0.5f * (down - up);
+  float determinant = jx.x * jy.y - jx.y * jy.x;
+  if (abs(determinant) < 0.05f) return along;
+  return (1.0f / determinant) *
+         vec2(jy.y * along.x - jy.x * along.y, jx.x * along.y - jx.y * along.x);
+}
+
+// Stores the variance of the pixel's match along the epipolar curve (px^2) and the speed there (pixels per unit
+// of inverse distance): residual variance of the patch over the information of its gradients.
+FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 m = vec3(held.x, held.y, held.z);
+  float correlation = 1.0f - held.w;
+  float speed = 0.0f;
+  float variance = UNMEASURED_VARIANCE;
+  if (is_usable(CONTEXT pixel, usable_ray) && correlation > 0.05f) {
+    int source = first_source(CONTEXT_ONLY);
+    vec2 velocity = source_velocity(CONTEXT source, ray, dot(m, ray));
+    speed = length(velocity);
+    vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
+    vec2 direction = reference_direction(CONTEXT source, pixel, m, along);
+    ivec4 size = PARAMETERS.cameras[PASS.reference].size;
+    float centre = intensity_at(CONTEXT PASS.reference, pixel);
+    float information = 0.0f;
+    float n = 0.0f;
+    float sum = 0.0f;
+    float sum_squares = 0.0f;
+    for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+      for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
+        ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+        if (q.x < 1 || q.y < 1 || q.x >= size.x - 1 || q.y >= size.y - 1) continue;
+        float a = intensity_at(CONTEXT PASS.reference, q);
+        float left = intensity_at(CONTEXT PASS.reference, ivec2(q.x - 1, q.y));
+        float right = intensity_at(CONTEXT PASS.reference, ivec2(q.x + 1, q.y));
+        float up = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y - 1));
+        float down = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y + 1));
+        if (min(min(a, min(left, right)), min(up, down)) < 0.0f) continue;
+        a -= centre;
+        float weight = sample_weight(CONTEXT a);
+        float slope = 0.5f * ((right - left) * direction.x + (down - up) * direction.y);
+        information += weight * slope * slope;
+        n += weight;
+        sum += weight * a;
+        sum_squares += weight * a * a;
+      }
+    }
+    // The checkerboard leaves out every other pixel, whose information is about the same.
+    information *= float(COLUMN_STEP) * correlation * correlation;
+    float spread = n > 0.0f ? max(sum_squares / n - sum * sum / (n * n), 0.0f) : 0.0f;
+    float residual = spread * (1.0f - correlation * correlation) + 1e-7f;
+    if (speed > 0.0f && information > 0.0f) {
+      variance = min(residual / information + SMALLEST_VARIANCE, UNMEASURED_VARIANCE);
+    }
+  }
+  store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, 0.0f, 0.0f));
+}
+
+// Inverse distance relative to the pixel's tangent plane: offset + slope_x x + slope_y y.
+struct LocalPlane {
+  float offset;
+  float slope_x;
+  float slope_y;
+};
+
+// One round of robust weighted least squares over the neighbourhood; false where it is degenerate.
+FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, float own_variance,
+                  LocalPlane guess, OUT(LocalPlane) fitted) {
+  fitted = guess;
+  ivec4 size = PARAMETERS.cameras[PASS.reference].size;
+  float centre = intensity_at(CONTEXT PASS.reference, pixel);
+  int radius = PASS.steps;
+  float fall_off = 2.0f / float(radius * radius);
+  float s = 0.0f;
+  float sx = 0.0f;
+  float sy = 0.0f;
+  float sxx = 0.0f;
+  float sxy = 0.0f;
+  float syy = 0.0f;
+  float sw = 0.0f;
+  float sxw = 0.0f;
+  float syw = 0.0f;
+  for (int dy = -radius; dy <= radius; dy += 2) {
+    for (int dx = -radius; dx <= radius; dx += 2) {
+      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+      if (!in_image(size, q)) continue;
+      vec4 measure = check_at(CONTEXT PASS.reference, q);
+      float a = intensity_at(CONTEXT PASS.reference, q);
+      if (measure.x >= UNMEASURED_VARIANCE || a < 0.0f) continue;
+      vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+      vec4 r = ray_at(CONTEXT PASS.reference, q);
+      vec3 direction = vec3(r.x, r.y, r.z);
+      float forward = dot(direction, ray);
+      if (forward < 0.1f) continue;
+      float x = TANGENT_SCALE * dot(direction, east) / forward;
+      float y = TANGENT_SCALE * dot(direction, south) / forward;
+      float w = (plane.x * r.x + plane.y * r.y + plane.z * r.z) / forward;
+      float residual = (w - guess.offset - guess.slope_x * x - guess.slope_y * y) * measure.y;
+      float scale2 = min(measure.x + own_variance, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      float weight = exp(-float(dx * dx + dy * dy) * fall_off -
+                         abs(a - centre) * PARAMETERS.support.y) *
+                     measure.y * measure.y / (measure.x * (1.0f + residual * residual / scale2));
+      s += weight;
+      sx += weight * x;
+      sy += weight * y;
+      sxx += weight * x * x;
+      sxy += weight * x * y;
+      syy += weight * y * y;
+      // Relative to the guess, which keeps the sums small.
+      float difference = w - guess.offset;
+      sw += weight * difference;
+      sxw += weight * difference * x;
+      syw += weight * difference * y;
+    }
+  }
+  if (!(s > 0.0f)) return false;
+  float mx = sx / s;
+  float my = sy / s;
+  // A weak pull towards the guess decides slopes that the neighbourhood leaves open.
+  float pull = 1e-3f * s;
+  float cxx = sxx - sx * mx + pull;
+  float cxy = sxy - sx * my;
+  float cyy = syy - sy * my + pull;
+  float cxw = sxw - sw * mx + pull * guess.slope_x;
+  float cyw = syw - sw * my + pull * guess.slope_y;
+  float determinant = cxx * cyy - cxy * cxy;
+  if (!(determinant > 1e-9f * cxx * cyy)) return false;
+  fitted.slope_x = (cyy * cxw - cxy * cyw) / determinant;
+  fitted.slope_y = (cxx * cyw - cxy * cxw) / determinant;
+  fitted.offset = guess.offset + sw / s - fitted.slope_x * mx - fitted.slope_y * my;
+  return true;
+}
+
+// Stores the neighbourhood's plane (m, 1) as the pixel's prior, zero where there is none.
+FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 m = vec3(held.x, held.y, held.z);
+  vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
+  if (is_usable(CONTEXT pixel, usable_ray) && held.w < INVALID_COST) {
+    vec3 axis = abs(ray.x) < 0.7f ? vec3(1.0f, 0.0f, 0.0f) : vec3(0.0f, 1.0f, 0.0f);
+    vec3 east = cross(ray, axis);
+    east = (1.0f / length(east)) * east;
+    vec3 south = cross(ray, east);
+    LocalPlane plane;
+    plane.offset = dot(m, ray);
+    plane.slope_x = dot(m, east) / TANGENT_SCALE;
+    plane.slope_y = dot(m, south) / TANGENT_SCALE;
+    float own_variance = check_at(CONTEXT PASS.reference, pixel).x;
+    bool found = true;
+    for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
+      LocalPlane fitted;
+      found = found && fit_plane(CONTEXT pixel, ray, east, south, own_variance, plane, fitted);
+      if (found) plane = fitted;
+    }
+    vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
+                     (TANGENT_SCALE * plane.slope_y) * south;
+    if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);
+  }
+  store_prior(CONTEXT PASS.reference, pixel, prior);
+}
+
+// Takes the prior over as the pixel's plane, where it can be seen in a source.
+FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
+  if (prior.w == 0.0f) return;
+  vec3 m = vec3(prior.x, prior.y, prior.z);
+  float cost = patch_cost(CONTEXT pixel, m);
+  if (cost < INVALID_COST) store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
+}
