@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/image_io.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "temporary_folder.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+using test::TemporaryFolder;
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+template <class Function>
+std::string error_of(Function function) {
+  try {
+    function();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+cv::Mat random_map(int type) {
+  cv::Mat map(37, 53, type);
+  cv::theRNG().state = 12;
+  cv::randu(map, -3, 9);
+  return map;
+}
+
+TEST(Maps, TiffAndPfmKeepEveryBit) {
+  const TemporaryFolder folder;
+  for (const int type : {CV_32FC1, CV_32FC3}) {
+    cv::Mat map = random_map(type);
+    map.ptr<float>(3)[5] = INFINITY;
+    map.ptr<float>(4)[6] = -1e-30f;
+    for (const char* name : {"a.tiff", "a.tif", "a.pfm"}) {
+      write_map(folder / name, map);
+      const cv::Mat again = read_map(folder / name);
+      ASSERT_EQ(again.type(), type) << name;
+      ASSERT_EQ(again.size(), map.size());
+      for (int y = 0; y < map.rows; ++y) {
+        EXPECT_EQ(std::memcmp(map.ptr(y), again.ptr(y), map.cols * map.elemSize()), 0) << name;
+      }
+    }
+  }
+}
+
+TEST(Maps, FilesHoldXYZInThisOrder) {
+  const TemporaryFolder folder;
+  const cv::Mat map(8, 8, CV_32FC3, cv::Scalar(1, 2, 3));
+  write_map(folder / "n.tiff", map);
+  // OpenCV reads channels as B G R, so the file's first channel comes last.
+  const cv::Mat raw = cv::imread((folder / "n.tiff").string(), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(raw.at<cv::Vec3f>(2, 2), cv::Vec3f(3, 2, 1));
+  write_map(folder / "n.pfm", map);
+  const std::string pfm = bytes_of(folder / "n.pfm");
+  float first[3];
+  std::memcpy(first, pfm.data() + pfm.size() - sizeof first, sizeof first);
+  EXPECT_EQ(first[0], 1);
+  EXPECT_EQ(first[2], 3);
+}
+
+TEST(Maps, PfmIsBottomRowFirstInBothByteOrders) {
+  const TemporaryFolder folder;
+  const float values[4] = {1.5f, 2.5f, 3.5f, 4.5f};
+  std::string little(reinterpret_cast<const char*>(values), sizeof values);
+  std::string big;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 3; j >= 0; --j) big += little[4 * i + j];
+  }
+  for (const auto& [scale, data] :
+       {std::pair<std::string, std::string>("-1.0", little), {"1.0", big}}) {
+    const cv::Mat map = read_map(folder.write("m.pfm", "Pf\n2 2\n" + scale + "\n" + data));
+    EXPECT_EQ(map.at<float>(1, 0), 1.5f);
+    EXPECT_EQ(map.at<float>(1, 1), 2.5f);
+    EXPECT_EQ(map.at<float>(0, 0), 3.5f);
+  }
+}
+
+TEST(Maps, PngRoundsAndMarksWhatItCannotHold) {
+  const TemporaryFolder folder;
+  const cv::Mat map = (cv::Mat_<float>(1, 6) << 1.2345f, 0, -2, NAN, 70, 0.0004f);
+  write_map(folder / "d.png", map, 1000);
+  const cv::Mat raw = cv::imread((folder / "d.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(raw.type(), CV_16UC1);
+  EXPECT_EQ(raw.at<ushort>(0, 0), 1235);  // 1234.5 rounds away from zero
+  for (int i = 1; i < 6; ++i) EXPECT_EQ(raw.at<ushort>(0, i), 0) << i;
+  EXPECT_FLOAT_EQ(read_map(folder / "d.png", 1000).at<float>(0, 0), 1.235f);
+}
+
+TEST(Maps, UnsupportedOnesAreRefused) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(write_map(folder / "a.jpg", random_map(CV_32FC1)), Error);
+  EXPECT_THROW(write_map(folder / "a.png", random_map(CV_32FC3)), Error);
+  EXPECT_THROW(write_map(folder / "a.tiff", random_map(CV_64FC1)), Error);
+  write_image(folder / "grey.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(3)));
+  EXPECT_NE(error_of([&] { read_map(folder / "grey.png"); }).find("grey.png"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.png"));
+}
+
+TEST(Images, KeepTheirDepthAndChannels) {
+  const TemporaryFolder folder;
+  for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3, CV_8UC4}) {
+    cv::Mat image(9, 7, type);
+    cv::randu(image, 0, 255);
+    write_image(folder / "i.png", image);
+    const cv::Mat again = read_image(folder / "i.png");
+    ASSERT_EQ(again.type(), type);
+    EXPECT_EQ(cv::norm(image, again, cv::NORM_INF), 0);
+  }
+}
+
+TEST(Images, BecomeIntensities) {
+  EXPECT_FLOAT_EQ(to_intensity(cv::Mat(1, 1, CV_8UC1, cv::Scalar(51)), "x").at<float>(0), 0.2f);
+  EXPECT_FLOAT_EQ(to_intensity(cv::Mat(1, 1, CV_16UC1, cv::Scalar(13107)), "x").at<float>(0), 0.2f);
+  // ITU-R BT.601 luma of pure blue.
+  EXPECT_NEAR(to_intensity(cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 0, 0)), "x").at<float>(0), 0.114,
+              2e-3);
+  EXPECT_NEAR(to_intensity(cv::Mat(1, 1, CV_8UC4, cv::Scalar(255, 255, 255, 0)), "x").at<float>(0),
+              1, 1e-6);
+  EXPECT_THROW(to_intensity(cv::Mat(), "x"), Error);
+  EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32SC1, cv::Scalar(3)), "x"), Error);
+  EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_8UC2, cv::Scalar(3)), "x"), Error);
+  EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32FC1, cv::Scalar(NAN)), "x"), Error);
+  EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32FC1, cv::Scalar(3)), "x"), Error);
+}
+
+TEST(BadFiles, AreNamed) {
+  const TemporaryFolder folder;
+  const auto message = [&](const std::filesystem::path& path) {
+    const std::string error = error_of([&] { read_image(path); });
+    EXPECT_NE(error.find(path.string()), std::string::npos) << error;
+    return error;
+  };
+  message(folder / "missing.png");
+  message(folder.path());
+  message(folder.write("empty.png", ""));
+  message(folder.write("garbage.png", "no image at all"));
+  message(folder.write("garbage.jpg", std::string("\xff\xd8\xff garbage")));
+  write_map(folder / "float.tiff", random_map(CV_32FC1));
+  message(folder / "float.tiff");
+}
+
+TEST(BadFiles, EveryTruncationIsNoticed) {
+  const TemporaryFolder folder;
+  cv::Mat image(40, 50, CV_8UC3);
+  cv::randu(image, 0, 255);
+  for (const char* name : {"i.png", "i.jpg"}) {
+    write_image(folder / name, image);
+    const std::string whole = bytes_of(folder / name);
+    ASSERT_NO_THROW(read_image(folder / name));
+    for (std::size_t size = 0; size < whole.size() - 2; size += whole.size() / 40) {
+      EXPECT_THROW(read_image(folder.write(std::string("cut_") + name, whole.substr(0, size))),
+                   Error)
+          << name << " " << size;
+    }
+  }
+  for (const char* name : {"m.pfm", "m.tiff"}) {
+    write_map(folder / name, random_map(CV_32FC1));
+    const std::string whole = bytes_of(folder / name);
+    for (std::size_t size = 0; size < whole.size() * 9 / 10; size += whole.size() / 40) {
+      EXPECT_THROW(read_map(folder.write(std::string("cut_") + name, whole.substr(0, size))), Error)
+          << name << " " << size;
+    }
+  }
+}
+
+TEST(BadFiles, PfmHeadersAreChecked) {
+  const TemporaryFolder folder;
+  for (const char* header :
+       {"Pf\n-2 2\n-1\n", "Pf\n2000000000 2000000000\n-1\n", "Pf\nnan 2\n-1\n", "Pf\n2 2\n0\n",
+        "Pf\n2 2\nnan\n", "P6\n2 2\n-1\n", "Pf\n2.5 2\n-1\n", "Pf\n", ""}) {
+    EXPECT_THROW(read_map(folder.write("h.pfm", header + std::string(16, 'x'))), Error) << header;
+  }
+}
+
+TEST(Writing, LeavesNothingBehindWhenItFails) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(write_atomically(folder / "a.txt",
+                                [](const std::filesystem::path& temporary) {
+                                  std::ofstream(temporary) << "half";
+                                  throw Error("disk full");
+                                }),
+               Error);
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  write_text(folder / "b.txt", "old");
+  EXPECT_THROW(write_atomically(folder / "b.txt", [](const auto&) { throw Error("no"); }), Error);
+  EXPECT_EQ(bytes_of(folder / "b.txt"), "old");
+  write_text(folder / "b.txt", "new");
+  EXPECT_EQ(bytes_of(folder / "b.txt"), "new");
+  EXPECT_THROW(write_text(folder / "no/such/folder.txt", "x"), Error);
+  EXPECT_THROW(write_text(folder / "b.txt/below.txt", "x"), Error);
+  EXPECT_THROW(prepare_output_folder(folder / "b.txt/below"), Error);
+  EXPECT_NO_THROW(prepare_output_folder(folder / "new/folder"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "new/folder"));
+}
+
+}  // namespace
+}  // namespace widestereo

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/pictures.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <sstream>
+
+#include "temporary_folder.h"
+#include "widestereo/error.h"
+#include "widestereo/matcher.h"
+#include "widestereo/point_cloud.h"
+
+namespace widestereo {
+namespace {
+
+TEST(Pictures, NearIsRedFarIsBlueNothingIsGrey) {
+  const cv::Mat distance = (cv::Mat_<float>(1, 3) << 1, 10, 0);
+  const cv::Mat picture = distance_picture(distance, {1, 10});
+  const cv::Vec3b near = picture.at<cv::Vec3b>(0, 0);
+  const cv::Vec3b far = picture.at<cv::Vec3b>(0, 1);
+  EXPECT_GT(near[2], near[0] + 50);
+  EXPECT_GT(far[0], far[2]);
+  const cv::Vec3b none = picture.at<cv::Vec3b>(0, 2);
+  EXPECT_EQ(none[0], none[1]);
+  EXPECT_EQ(none[1], none[2]);
+}
+
+TEST(Pictures, RobustRangeIgnoresOutliersAndHoles) {
+  cv::Mat distance(100, 100, CV_32FC1, cv::Scalar(2));
+  distance.rowRange(50, 100).setTo(4);
+  distance.at<float>(0, 0) = 0.001f;
+  distance.at<float>(0, 1) = 0;
+  distance.at<float>(0, 2) = -5;
+  const ColourRange range = robust_range(distance);
+  EXPECT_NEAR(range.nearest, 2, 1e-6);
+  EXPECT_NEAR(range.farthest, 4, 1e-6);
+  EXPECT_LT(robust_range(cv::Mat::zeros(3, 3, CV_32FC1)).nearest,
+            robust_range(cv::Mat::zeros(3, 3, CV_32FC1)).farthest);
+}
+
+TEST(Pictures, NormalsHaveDocumentedColours) {
+  cv::Mat normals(1, 2, CV_32FC3, cv::Scalar(0, 0, 0));
+  normals.at<cv::Vec3f>(0, 0) = {0, -1, 0};  // a floor: green
+  const cv::Mat picture = normal_picture(normals);
+  EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(128, 255, 128));
+}
+
+TEST(Pictures, ReasonsCoverTheImage) {
+  cv::Mat reasons = cv::Mat::zeros(2, 2, CV_8UC1);
+  reasons.at<uchar>(0, 1) = reason_inconsistent | reason_tilt;
+  const cv::Mat image(2, 2, CV_8UC1, cv::Scalar(77));
+  const cv::Mat picture = reason_picture(reasons, image);
+  EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(77, 77, 77));
+  EXPECT_NE(picture.at<cv::Vec3b>(0, 1), cv::Vec3b(77, 77, 77));
+}
+
+TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
+  const cv::Mat picture(100, 200, CV_8UC3, cv::Scalar(1, 2, 3));
+  for (const cv::Mat& with : {with_distance_legend(picture, {1, 5}),
+                              with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
+    EXPECT_EQ(with.cols, 200);
+    EXPECT_GT(with.rows, 110);
+    EXPECT_EQ(cv::norm(with.rowRange(0, 100), picture, cv::NORM_INF), 0);
+    cv::Scalar mean;
+    cv::Scalar spread;
+    cv::meanStdDev(with.rowRange(100, with.rows), mean, spread);
+    EXPECT_GT(spread[0], 5) << "something must be drawn";
+  }
+}
+
+TEST(Pictures, SheetHoldsAllPanels) {
+  const cv::Mat grey(50, 80, CV_8UC1, cv::Scalar(9));
+  const cv::Mat deep(100, 160, CV_16UC3, cv::Scalar(1000, 2000, 3000));
+  const cv::Mat sheet = panel_sheet({{"a", grey}, {"b", deep}, {"c", grey}}, 2);
+  EXPECT_GT(sheet.cols, 160);
+  EXPECT_GT(sheet.rows, 100);
+  EXPECT_EQ(sheet.type(), CV_8UC3);
+}
+
+TEST(PointCloud, PlacesPointsInTheWorld) {
+  const cv::Mat distance = (cv::Mat_<float>(1, 3) << 2, 0, INFINITY);
+  cv::Mat rays(1, 3, CV_32FC4, cv::Scalar(0, 0, 1, 1));
+  const cv::Mat normals(1, 3, CV_32FC3, cv::Scalar(0, 0, -1));
+  const cv::Mat image(1, 3, CV_8UC3, cv::Scalar(10, 20, 30));
+  const cv::Mat confidence(1, 3, CV_32FC1, cv::Scalar(0.25));
+  const Eigen::Isometry3d pose =
+      Eigen::Translation3d(1, 2, 3) * Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY());
+  const PointCloud cloud = make_point_cloud(distance, rays, normals, image, confidence, pose);
+  ASSERT_EQ(cloud.size(), 1u);
+  EXPECT_LT((cloud[0].position - Eigen::Vector3f(3, 2, 3)).norm(), 1e-6f);
+  EXPECT_LT((cloud[0].normal - Eigen::Vector3f(-1, 0, 0)).norm(), 1e-6f);
+  EXPECT_EQ(cloud[0].red, 30);
+  EXPECT_EQ(cloud[0].blue, 10);
+  EXPECT_THROW(make_point_cloud(distance, rays, cv::Mat(2, 3, CV_32FC3), {}, {}, pose), Error);
+
+  const test::TemporaryFolder folder;
+  write_ply(folder / "c.ply", cloud);
+  std::ifstream file(folder / "c.ply", std::ios::binary);
+  std::string line;
+  int header_vertices = -1;
+  while (std::getline(file, line) && line != "end_header") {
+    std::istringstream words(line);
+    std::string word;
+    words >> word;
+    if (word == "element") words >> word >> header_vertices;
+  }
+  EXPECT_EQ(header_vertices, 1);
+  float numbers[6];
+  unsigned char colour[3];
+  float certainty = 0;
+  file.read(reinterpret_cast<char*>(numbers), sizeof numbers);
+  file.read(reinterpret_cast<char*>(colour), sizeof colour);
+  file.read(reinterpret_cast<char*>(&certainty), sizeof certainty);
+  ASSERT_TRUE(file);
+  EXPECT_NEAR(numbers[0], 3, 1e-6);
+  EXPECT_NEAR(numbers[3], -1, 1e-6);
+  EXPECT_EQ(colour[1], 20);
+  EXPECT_EQ(certainty, 0.25f);
+  EXPECT_EQ(file.peek(), EOF);
+}
+
+}  // namespace
+}  // namespace widestereo
