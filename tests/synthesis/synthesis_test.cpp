@@ -87,7 +87,7 @@ TEST(RenderDemo, ViewsShowTheSameSceneThroughTheirTruth) {
         const float there = pair.views[1].truth.distance.at<float>(
             std::clamp(static_cast<int>(std::lround(u.y())), 0, 191),
             std::clamp(static_cast<int>(std::lround(u.x())), 0, 191));
-        hidden += there > 0 && there < point.norm() * 1.02;
+        hidden += there > 0 && static_cast<double>(there) < 1.02 * point.norm();
       }
       if (occlusion != 255) continue;
       const double other = grey_at(pair.views[1].image, u);
