@@ -9,3 +9,4 @@ void add_depth_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_calibration_command(CLI::App& app);
 void add_devices_command(CLI::App& app);
+void add_benchmark_command(CLI::App& app);

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   add_evaluate_command(app);
   add_calibration_command(app);
   add_devices_command(app);
+  add_benchmark_command(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
