@@ -80,14 +80,21 @@ double kannala_brandt_theta(const kernel::precise::CameraParameters& p, double r
   return increasing_root(value_and_slope, 0, limit, r);
 }
 
-/// Inverts the Brown-Conrady distortion of a point in place; false outside the increasing part.
-bool undistort(const kernel::precise::CameraParameters& p, Vector2d& point) {
-  // The radial part alone brackets the radius; Newton in two dimensions adds the tangential part.
+/// Distortion of a point on the normalised plane less `target`, with its (symmetric) Jacobian.
+Vector2d distortion_residual(const kernel::dual::CameraParameters& p, const Vector2d& point,
+                             const Vector2d& target, Eigen::Matrix2d& jacobian) {
+  const Dual x(point.x(), Eigen::RowVector3d::UnitX());
+  const Dual y(point.y(), Eigen::RowVector3d::UnitY());
+  const kernel::dual::real2 d = kernel::dual::distort(p, x, y, x * x + y * y);
+  jacobian << d.x.derivative.head<2>(), d.y.derivative.head<2>();
+  return Vector2d(d.x.value, d.y.value) - target;
+}
+
+/// Radius whose radial distortion alone has the length `norm`, or the end of the domain.
+double undistorted_radius(const kernel::precise::CameraParameters& p, double norm) {
   const double k1 = p.distortion.x;
   const double k2 = p.distortion.y;
   const double k3 = p.domain.w;
-  const Vector2d m = point;
-  const double norm = m.norm();
   const auto value_and_slope = [&](double r) {
     const double q = r * r;
     return std::pair(r * (1 + q * (k1 + q * (k2 + q * k3))) - norm,
@@ -96,20 +103,37 @@ bool undistort(const kernel::precise::CameraParameters& p, Vector2d& point) {
   const double largest = std::sqrt(p.domain.y);
   double high = std::min(largest, std::max(1.0, 2 * norm));
   while (high < largest && value_and_slope(high).first < 0) high = std::min(largest, 2 * high);
-  const double radius = increasing_root(value_and_slope, 0, high, norm);
-  if (norm > 0) point = m * (radius / norm);
+  return increasing_root(value_and_slope, 0, high, norm);
+}
 
+/// Inverts the Brown-Conrady distortion of a point in place; false outside the increasing part.
+bool undistort(const kernel::precise::CameraParameters& p, Vector2d& point) {
   const kernel::dual::CameraParameters dual = constant(p);
-  for (int i = 0; i < 30; ++i) {
-    const Dual x(point.x(), Eigen::RowVector3d::UnitX());
-    const Dual y(point.y(), Eigen::RowVector3d::UnitY());
-    const kernel::dual::real2 d = kernel::dual::distort(dual, x, y, x * x + y * y);
-    Eigen::Matrix2d jacobian;
-    jacobian << d.x.derivative.head<2>(), d.y.derivative.head<2>();
-    const Vector2d step = jacobian.inverse() * (m - Vector2d(d.x.value, d.y.value));
+  const Vector2d target = point;
+  const double norm = target.norm();
+  // The Jacobian is singular at the end of the domain: start inside it.
+  const double start = std::min(undistorted_radius(p, norm), 0.999 * std::sqrt(p.domain.y));
+  if (norm > 0) point = target * (start / norm);
+
+  Eigen::Matrix2d jacobian;
+  Vector2d residual = distortion_residual(dual, point, target, jacobian);
+  for (int i = 0; i < 50 && residual.norm() > 1e-15 * (1 + norm); ++i) {
+    const Vector2d step = -jacobian.inverse() * residual;
     if (!step.allFinite()) return false;
-    point += step;
-    if (step.norm() <= 1e-15 * (1 + point.norm())) break;
+    // Within the domain the Jacobian is positive definite: a short enough step always improves.
+    double scale = 1;
+    Vector2d next;
+    Vector2d next_residual;
+    do {
+      next = point + scale * step;
+      next_residual = distortion_residual(dual, next, target, jacobian);
+      scale *= 0.5;
+    } while (scale > 1e-4 &&
+             (next.squaredNorm() >= p.domain.y || next_residual.norm() > residual.norm()));
+    const bool improved = next_residual.norm() < residual.norm();
+    if (!improved) break;
+    point = next;
+    residual = next_residual;
   }
   return point.squaredNorm() < p.domain.y;
 }
@@ -178,13 +202,22 @@ bool unproject_with(const Camera& c, const kernel::precise::CameraParameters& p,
          (again - pixel).norm() <= unprojection_tolerance * (1 + pixel.norm() / 1000);
 }
 
+std::string size_text(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
 }  // namespace
 
 std::string to_string(CameraModel model) {
   static const std::array<const char*, 8> names = {
       "pinhole", "pinhole_radtan",   "kannala_brandt", "double_sphere",
       "unified", "extended_unified", "field_of_view",  "mei"};
-  return names.at(static_cast<std::size_t>(model));
+  const auto index = static_cast<std::size_t>(model);
+  if (index >= names.size()) {
+    throw Error("The camera model number " + std::to_string(static_cast<int>(model)) +
+                " is unknown; use one of CameraModel.");
+  }
+  return names[index];
 }
 
 bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel) {
@@ -224,6 +257,10 @@ double model_max_theta(const Camera& camera) {
 }
 
 Camera resized(const Camera& camera, int width, int height) {
+  if (camera.width < 1 || camera.height < 1 || width < 1 || height < 1) {
+    throw Error("Cannot resize a camera of " + size_text(camera.width, camera.height) + " to " +
+                size_text(width, height) + "; both must have at least one pixel.");
+  }
   const double sx = static_cast<double>(width) / camera.width;
   const double sy = static_cast<double>(height) / camera.height;
   Camera result = camera;
@@ -238,6 +275,13 @@ Camera resized(const Camera& camera, int width, int height) {
 }
 
 cv::Mat ray_image(const Camera& camera, const cv::Mat& mask) {
+  validate(camera, "The camera of the ray image");
+  if (!mask.empty() &&
+      (mask.type() != CV_8UC1 || mask.cols != camera.width || mask.rows != camera.height)) {
+    throw Error("The mask of the ray image is " + size_text(mask.cols, mask.rows) +
+                " pixels, but the camera has " + size_text(camera.width, camera.height) +
+                "; use an 8-bit grey mask of that size.");
+  }
   Camera whole = camera;
   whole.max_theta = std::numbers::pi;
   const kernel::precise::CameraParameters model = camera_parameters(whole);

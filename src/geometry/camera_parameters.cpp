@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <unsupported/Eigen/Polynomials>
 
@@ -12,35 +13,35 @@ namespace {
 /// Stands for "no limit"; representable in single precision.
 constexpr double unlimited = 1e30;
 
-/// Smallest positive real root of c0 + c1 x + ... (lowest power first), `unlimited` if there is
-/// none.
-double smallest_positive_root(Eigen::VectorXd coefficients) {
-  Eigen::Index degree = coefficients.size() - 1;
-  while (degree > 0 && coefficients[degree] == 0) --degree;
-  if (degree == 0) return unlimited;
-  const Eigen::VectorXd polynomial = coefficients.head(degree + 1);
-  Eigen::PolynomialSolver<double, Eigen::Dynamic> solver;
-  solver.compute(polynomial);
-  double smallest = unlimited;
+/// Smallest positive root of 1 + c[0] x + ... + c[n-1] x^n, `unlimited` if there is none.
+template <int degree>
+double smallest_positive_root(const Eigen::Matrix<double, degree, 1>& c) {
+  // In 1/x the polynomial is monic, so that vanishing high coefficients do no harm.
+  Eigen::Matrix<double, degree + 1, 1> reversed;
+  reversed << c.reverse(), 1;
+  const Eigen::PolynomialSolver<double, degree> solver(reversed);
+  double largest = 1 / unlimited;
   for (const std::complex<double>& root : solver.roots()) {
     const bool is_real = std::abs(root.imag()) <= 1e-9 * (1 + std::abs(root.real()));
-    if (is_real && root.real() > 0) smallest = std::min(smallest, root.real());
+    if (is_real) largest = std::max(largest, root.real());
   }
-  return smallest;
+  return 1 / largest;
 }
 
 /// Largest theta up to which theta (1 + k1 theta^2 + ...) increases, at most pi.
 double kannala_brandt_limit(const Camera& c) {
-  Eigen::VectorXd derivative(5);  // in theta^2
-  derivative << 1, 3 * c.k1, 5 * c.k2, 7 * c.k3, 9 * c.k4;
-  return std::min(std::numbers::pi, std::sqrt(smallest_positive_root(derivative)));
+  const Eigen::Vector4d derivative(3 * c.k1, 5 * c.k2, 7 * c.k3, 9 * c.k4);  // in theta^2
+  return std::min(std::numbers::pi, std::sqrt(smallest_positive_root<4>(derivative)));
 }
 
-/// Largest squared radius up to which r (1 + k1 r^2 + k2 r^4 + k3 r^6) increases.
+/// Largest squared radius up to which the distortion increases in every direction. The tangential
+/// part changes the slope along the radius most against (p2, p1), by -6 |p| r, and there the
+/// Jacobian first becomes singular: while that slope is positive, so is the other eigenvalue.
 double radtan_limit(const Camera& c) {
-  Eigen::VectorXd derivative(4);  // in r^2
-  derivative << 1, 3 * c.k1, 5 * c.k2, 7 * c.k3;
-  return smallest_positive_root(derivative);
+  Eigen::Vector<double, 6> derivative;  // in r
+  derivative << -6 * std::hypot(c.p1, c.p2), 3 * c.k1, 0, 5 * c.k2, 0, 7 * c.k3;
+  const double radius = smallest_positive_root<6>(derivative);
+  return std::min(unlimited, radius * radius);
 }
 
 /// The domain factor w of the sphere models: alpha / (1 - alpha) or its inverse, at most 1.
@@ -83,7 +84,7 @@ Parameters fill(const Camera& c) {
   }
   // -2: every direction, whatever rounding does to cos(pi).
   const double cosine = c.max_theta >= std::numbers::pi ? -2 : std::cos(c.max_theta);
-  p.domain = {real(cosine), real(std::min(limit, unlimited)), real(c.skew), real(c.k3)};
+  p.domain = {real(cosine), real(limit), real(c.skew), real(c.k3)};
   p.size = {c.width, c.height, static_cast<int>(c.model), 0};
   return p;
 }
