@@ -18,7 +18,7 @@ namespace {
 
 struct DemoArguments {
   std::string output = "demo";
-  int size = 256;
+  int size = 384;
   MatchSettings settings;
   FolderFormat format;
   bool as_json = false;

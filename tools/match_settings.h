@@ -12,7 +12,7 @@
 
 /// Values given on the command line; the rest comes from the preset.
 struct MatchSettings {
-  std::string preset = "fast";
+  std::string preset = "quality";
   widestereo::DeviceRequest device;
   std::optional<double> min_distance, max_distance;
   std::optional<int> window_radius, first_iterations, second_iterations, refinements, best_sources;
