@@ -30,6 +30,7 @@ class Storage {
       cv::Mat value;
       if (node.isReal() || node.isInt()) return cv::Mat(1, 1, CV_64F, cv::Scalar(node.real()));
       if (!node.isMap()) continue;
+      require_small(node, key);
       node >> value;
       if (value.empty() || value.channels() != 1) continue;
       value.convertTo(value, CV_64F);
@@ -64,6 +65,18 @@ class Storage {
   }
 
  private:
+  /// A damaged header must not make OpenCV allocate gigabytes.
+  void require_small(const cv::FileNode& node, const char* key) const {
+    constexpr double largest_side = 64;
+    for (const char* side : {"rows", "cols"}) {
+      const double count = node[side].isInt() ? node[side].real() : 0;
+      if (count < 0 || count > largest_side) {
+        document_.fail(std::string("The matrix ") + key + " has an impossible number of " + side +
+                       ".");
+      }
+    }
+  }
+
   cv::Size size_of(double width, double height) const {
     if (!(width >= 1 && height >= 1 && width <= 1e6 && height <= 1e6)) {
       document_.fail("The image size is not a pair of whole numbers of pixels.");

@@ -308,6 +308,7 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect(replaced(opencv_text, "[ 1., 0., 0., 0., 1.", "[ 1., 0., 0., 0., 2."), "rigid");
   expect(replaced(opencv_text, "[ -0.125, 0., 0. ]", "[ 0., 0., 0. ]"), "baseline");
   expect(replaced(opencv_text, "-0.028", ".Nan"), "");
+  expect(replaced(opencv_text, "rows: 3", "rows: 1900000000"), "rows");
 }
 
 /// Whatever bytes come, the reader answers with a rig or an Error.
