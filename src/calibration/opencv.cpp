@@ -69,7 +69,7 @@ class Storage {
   void require_small(const cv::FileNode& node, const char* key) const {
     constexpr double largest_side = 64;
     for (const char* side : {"rows", "cols"}) {
-      const double count = node[side].isInt() ? node[side].real() : 0;
+      const double count = node[side].isInt() ? node[side].real() : -1;
       if (count < 0 || count > largest_side) {
         document_.fail(std::string("The matrix ") + key + " has an impossible number of " + side +
                        ".");
