@@ -11,6 +11,7 @@
 
 #include "plane.glsl"
 #include "patch.glsl"
+#include "consistency.glsl"
 #include "check.glsl"
 
 void main() {

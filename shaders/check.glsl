@@ -11,9 +11,6 @@
 #define REASON_LOW_PARALLAX 64
 #define REASON_TILT 128
 
-// Stands for "not measurable" in maps that a person may read.
-#define UNKNOWN_DIFFERENCE 1000.0f
-
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   float centre = intensity_at(CONTEXT PASS.reference, pixel);
@@ -33,33 +30,6 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
     }
   }
   return (sum_squares - sum * sum / n) / n;
-}
-
-// Relative difference of distance (x) and displacement in reference pixels (y) between the pixel's point and
-// where the source's own plane puts it; UNKNOWN_DIFFERENCE where the source has no plane there.
-FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec3 m) {
-  vec2 unknown = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
-  CameraParameters camera = PARAMETERS.cameras[source];
-  vec2 position;
-  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return unknown;
-  ivec2 q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
-  if (!in_image(camera.size, q)) return unknown;
-  vec4 other = hypothesis_at(CONTEXT source, q);
-  if (other.w >= INVALID_COST) return unknown;
-
-  float w = dot(m, ray);
-  vec3 direction = direction_in_source(pair, ray, w);
-  // The source's inverse distance along this direction, in units of 1 / |direction|.
-  float w_source = dot(vec3(other.x, other.y, other.z), direction);
-  if (w_source <= 0.0f) return unknown;
-  float relative = abs(w / w_source - 1.0f);
-  vec3 back = rotate_back(pair, direction - w_source * translation(pair));
-  vec2 reprojected;
-  CameraParameters reference_camera = PARAMETERS.cameras[PASS.reference];
-  if (!project(reference_camera, reference_camera.size.z, back, reprojected)) return unknown;
-  return vec2(min(relative, UNKNOWN_DIFFERENCE),
-              min(length(reprojected - vec2(float(pixel.x), float(pixel.y))), UNKNOWN_DIFFERENCE));
 }
 
 // Pixels that the point moves in the source over the whole range of inverse distance, by the derivative at

@@ -15,6 +15,7 @@
 #include "search.glsl"
 #include "pyramid.glsl"
 #include "adaptive_search.glsl"
+#include "consistency.glsl"
 #include "regression.glsl"
 
 void main() {

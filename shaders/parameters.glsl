@@ -34,7 +34,8 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
   uint candidates;  // adaptive search: bit k: candidate kind k is tried
-  float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
+  float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
+                      // regression: standard deviation (px) that is enough; 0: normals only
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int steps;          // sweep: inverse distances; regression: radius in pixels
 };

@@ -8,7 +8,14 @@
 #define SMALLEST_VARIANCE 4e-4f
 // Largest scale (px) of the robust weights.
 #define LARGEST_RESIDUAL 0.6f
-#define REGRESSION_ROUNDS 3
+// Displacements from the source's own plane (px): largest that counts, and what an unchecked pixel counts as.
+#define LARGEST_DISPLACEMENT 5.0f
+#define UNCHECKED_DISPLACEMENT 1.0f
+// Rounds, the last two over the whole radius, the others over a quarter and a half of it.
+#define REGRESSION_ROUNDS 4
+#define WHOLE_RADIUS_ROUND 2
+// First random slot; the search uses lower ones.
+#define REGRESSION_SLOT 64
 // Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
 #define TANGENT_SCALE 100.0f
 
@@ -36,7 +43,8 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
 }
 
 // Stores the variance of the pixel's match along the epipolar curve (px^2) and the speed there (pixels per unit
-// of inverse distance): residual variance of the patch over the information of its gradients.
+// of inverse distance): residual variance of the patch over the information of its gradients, and the square of
+// half the displacement from the source's own plane, which exposes what the patch itself cannot tell.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -81,7 +89,11 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float spread = n > 0.0f ? max(sum_squares / n - sum * sum / (n * n), 0.0f) : 0.0f;
     float residual = spread * (1.0f - correlation * correlation) + 1e-7f;
     if (speed > 0.0f && information > 0.0f) {
-      variance = min(residual / information + SMALLEST_VARIANCE, UNMEASURED_VARIANCE);
+      vec2 difference = difference_from_source(CONTEXT source, pixel, ray, m);
+      float displacement = difference.y < UNKNOWN_DIFFERENCE ? min(difference.y, LARGEST_DISPLACEMENT)
+                                                             : UNCHECKED_DISPLACEMENT;
+      variance = min(residual / information + SMALLEST_VARIANCE + 0.25f * displacement * displacement,
+                     UNMEASURED_VARIANCE);
     }
   }
   store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, 0.0f, 0.0f));
@@ -94,14 +106,21 @@ struct LocalPlane {
   float slope_y;
 };
 
-// One round of robust weighted least squares over the neighbourhood; false where it is degenerate.
+// One round of robust weighted least squares over a sparse grid of the neighbourhood; false where it is
+// degenerate. `certainty`: inverse variance of the offset, as if each pixel of the neighbourhood were measured
+// by itself.
 FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, float own_variance,
-                  LocalPlane guess, OUT(LocalPlane) fitted) {
+                  int round, LocalPlane guess, OUT(LocalPlane) fitted, OUT(float) certainty) {
   fitted = guess;
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float centre = intensity_at(CONTEXT PASS.reference, pixel);
-  int radius = PASS.steps;
+  int radius = max(PASS.steps >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
   float fall_off = 2.0f / float(radius * radius);
+  int step = max(radius / 4, 1);
+  // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
+  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, REGRESSION_SLOT + round);
+  int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;
+  int first_y = int(u.y * float(step)) - step / 2 - radius + radius % step;
   float s = 0.0f;
   float sx = 0.0f;
   float sy = 0.0f;
@@ -111,8 +130,8 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float sw = 0.0f;
   float sxw = 0.0f;
   float syw = 0.0f;
-  for (int dy = -radius; dy <= radius; dy += 2) {
-    for (int dx = -radius; dx <= radius; dx += 2) {
+  for (int dy = first_y; dy <= radius; dy += step) {
+    for (int dx = first_x; dx <= radius; dx += step) {
       ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
       if (!in_image(size, q)) continue;
       vec4 measure = check_at(CONTEXT PASS.reference, q);
@@ -127,10 +146,12 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float y = TANGENT_SCALE * dot(direction, south) / forward;
       float w = (plane.x * r.x + plane.y * r.y + plane.z * r.z) / forward;
       float residual = (w - guess.offset - guess.slope_x * x - guess.slope_y * y) * measure.y;
-      float scale2 = min(measure.x + own_variance, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own.
+      float scale2 = 2.0f * min(measure.x + own_variance, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      float doubt = 1.0f + residual * residual / scale2;
       float weight = exp(-float(dx * dx + dy * dy) * fall_off -
                          abs(a - centre) * PARAMETERS.support.y) *
-                     measure.y * measure.y / (measure.x * (1.0f + residual * residual / scale2));
+                     measure.y * measure.y / (measure.x * doubt * doubt);
       s += weight;
       sx += weight * x;
       sy += weight * y;
@@ -144,6 +165,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       syw += weight * difference * y;
     }
   }
+  certainty = s * float(step * step);
   if (!(s > 0.0f)) return false;
   float mx = sx / s;
   float my = sy / s;
@@ -162,7 +184,9 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   return true;
 }
 
-// Stores the neighbourhood's plane (m, 1) as the pixel's prior, zero where there is none.
+// Stores the plane of the smallest neighbourhood that determines it to PASS.step_pixels (m, 1) as the pixel's
+// prior, zero where there is none. Without PASS.step_pixels the whole neighbourhood gives the normal, and the
+// pixel keeps its distance.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -178,13 +202,19 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.offset = dot(m, ray);
     plane.slope_x = dot(m, east) / TANGENT_SCALE;
     plane.slope_y = dot(m, south) / TANGENT_SCALE;
-    float own_variance = check_at(CONTEXT PASS.reference, pixel).x;
-    bool found = true;
-    for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
+    vec4 own = check_at(CONTEXT PASS.reference, pixel);
+    bool normal_only = PASS.step_pixels == 0.0f;
+    bool found = false;
+    float w = plane.offset;
+    for (int round = normal_only ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
       LocalPlane fitted;
-      found = found && fit_plane(CONTEXT pixel, ray, east, south, own_variance, plane, fitted);
-      if (found) plane = fitted;
+      float certainty;
+      if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, plane, fitted, certainty)) continue;
+      plane = fitted;
+      found = true;
+      if (certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) break;
     }
+    if (normal_only) plane.offset = w;
     vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
                      (TANGENT_SCALE * plane.slope_y) * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);

@@ -74,6 +74,8 @@ void MatchSettings::add_to(CLI::App& command) {
       ->delimiter(',');
   add("--regression-radius", regression_radius, "Radius of the plane regression, pixels");
   add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
+  add("--regression-precision", regression_precision,
+      "Precision that lets the regression do with a smaller neighbourhood, pixels");
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
   add("--step-normal", step_normal, "First perturbation of a unit normal");
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");
@@ -114,6 +116,7 @@ Options MatchSettings::options() const {
   take(options.level_regressions, level_regressions);
   take(options.regression_radius, regression_radius);
   take(options.regression_scale, regression_scale);
+  take(options.regression_precision, regression_precision);
   take(options.step_pixels, step_pixels);
   take(options.step_normal, step_normal);
   take(options.source_planes, source_planes);

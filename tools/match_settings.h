@@ -20,7 +20,8 @@ struct MatchSettings {
   std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt;
   std::optional<double> consistency_relative, consistency_pixels;
   std::optional<int> levels, sweep_steps, regression_radius;
-  std::optional<double> weight_scale, regression_scale, step_pixels, step_normal;
+  std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,
+      step_normal;
   std::optional<bool> source_planes;
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;

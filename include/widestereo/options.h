@@ -66,11 +66,14 @@ struct Options {
   int sweep_steps = 64;                           ///< inverse distances tried at the coarsest level
   std::vector<int> level_iterations = {3, 2, 1};  ///< coarsest level first, one for each level
   std::vector<int> level_regressions = {1, 1, 2};  ///< rounds of plane regression, likewise
-  int regression_radius = 12;                      ///< pixels
-  double regression_scale = 15;  ///< intensity scale of the regression's weights, grey levels
-  double step_pixels = 1;        ///< first perturbation, source pixels; halved each iteration
-  double step_normal = 0.5;      ///< first perturbation of a unit normal; halved each iteration
-  bool source_planes = true;     ///< try the planes that the source views hold
+  int regression_radius = 36;    ///< largest neighbourhood of a regressed plane, pixels, 2..64
+  double regression_scale = 12;  ///< intensity scale of the regression's weights, grey levels
+  /// A neighbourhood of a quarter or half the radius is taken where it determines the plane to this
+  /// standard deviation (source pixels, nominal: neighbours count as independent); > 0.
+  double regression_precision = 0.013;
+  double step_pixels = 1;     ///< first perturbation, source pixels; halved each iteration
+  double step_normal = 0.5;   ///< first perturbation of a unit normal; halved each iteration
+  bool source_planes = true;  ///< try the planes that the source views hold
 
   double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation
                              ///< carry no information

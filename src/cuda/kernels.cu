@@ -103,6 +103,7 @@ DEVICE void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "search.glsl"
 #include "pyramid.glsl"
 #include "adaptive_search.glsl"
+#include "consistency.glsl"
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"

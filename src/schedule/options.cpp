@@ -37,12 +37,13 @@ Options Options::preset_named(const std::string& name) {
   options.search = SearchMethod::pyramid;
   options.warp = PatchWarp::affine;
   options.sampling = DistanceSampling::inverse;
-  options.weight_scale = 25;
+  options.window_radius = 4;
+  options.weight_scale = 12;
   options.min_texture = 0;
   if (name == "fast") {
     options.pattern = PatchPattern::checkerboard;
     options.sweep_steps = 30;
-    options.level_iterations = {2, 2, 1};
+    options.level_iterations = {2, 2, 2};
     options.level_regressions = {1, 1, 2};
     options.source_planes = false;
     return options;
@@ -50,7 +51,7 @@ Options Options::preset_named(const std::string& name) {
   if (name == "quality") {
     options.sweep_steps = 128;
     options.level_iterations = {4, 3, 2};
-    options.level_regressions = {1, 2, 3};
+    options.level_regressions = {1, 2, 2};
     return options;
   }
   std::string known;
@@ -87,6 +88,7 @@ void validate(const Options& o) {
   }
   require_between(o.regression_radius, 2, 64, "regression radius");
   require_between(o.regression_scale, 0.1, 10000, "regression scale");
+  require_between(o.regression_precision, 1e-6, 1000, "regression precision");
   require_between(o.step_pixels, 0, 1000, "step pixels");
   require_between(o.step_normal, 0, 2, "step normal");
   require_between(o.min_texture, 0, 255, "min texture");
@@ -113,6 +115,7 @@ std::string to_json(const Options& o) {
                                        {"level_regressions", o.level_regressions},
                                        {"regression_radius", o.regression_radius},
                                        {"regression_scale", o.regression_scale},
+                                       {"regression_precision", o.regression_precision},
                                        {"step_pixels", o.step_pixels},
                                        {"step_normal", o.step_normal},
                                        {"source_planes", o.source_planes},

@@ -151,8 +151,11 @@ class Builder {
         for (const int view : views_of(level)) search(view, i, first);
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
-        for (const int view : views_of(level)) regress(view, level);
+        for (const int view : views_of(level)) regress(view, level, options_.regression_precision);
       }
+    }
+    if (options_.level_regressions.back() > 0) {
+      for (const int view : views_of(0)) regress(view, 0, normal_only);
     }
   }
 
@@ -255,19 +258,23 @@ class Builder {
     }
   }
 
-  void regress(int view, int level) {
+  void regress(int view, int level, double precision) {
     kernel::PassParameters pass = pass_of(view);
-    // Two thirds at coarse levels, where a pixel covers more of the scene.
+    pass.iteration = ++regressions_;
+    // A third at coarse levels, where a pixel covers more of the scene.
     pass.steps =
-        level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius * 2 / 3);
+        level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
+    pass.step_pixels = static_cast<float>(precision);
     add(Kernel::measure, pass, view, 0);
     add(Kernel::regress, pass, view, 0);
     add(Kernel::adopt, pass, view, 1);
   }
 
+  static constexpr double normal_only = 0;
   const Options& options_;
   int levels_ = 1;
   int views_of_rig_ = 2;
+  int regressions_ = 0;
   Schedule schedule_;
 };
 
