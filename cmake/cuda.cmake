@@ -64,5 +64,6 @@ if(WIDESTEREO_HAS_CUDA)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/convert_maps.cu PROPERTIES COMPILE_OPTIONS -fmad=false)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/architectures.cpp PROPERTIES COMPILE_DEFINITIONS
                               "WIDESTEREO_CUDA_ARCHITECTURES=\"${architectures}\"")
+  target_compile_definitions(widestereo_cuda PUBLIC WIDESTEREO_HAS_CUDA)
   target_link_libraries(widestereo_cuda PUBLIC CUDA::cudart_static)
 endif()

@@ -5,19 +5,13 @@
 #include <string>
 #include <vector>
 
+#include "cuda/cuda_target.h"
 #include "cuda/handle.h"
 #include "cuda/kernels.h"
 #include "matching/backend.h"
 #include "schedule/bands.h"
 
 namespace widestereo {
-
-/// Which device a backend works on, and how.
-struct CudaTarget {
-  int ordinal = -1;  ///< -1: whichever device and context are current in the calling thread
-  std::string name;  ///< for messages
-  long long max_samples = 0;  ///< longest launch in patch samples, 0 = no limit
-};
 
 /// Device memory and kernels for matches of fixed sizes. Not thread-safe. Work goes to a stream of
 /// its own, except for enqueue().

@@ -99,12 +99,8 @@ long long default_max_samples(int index) {
 
 class CudaDevice final : public Device::Implementation {
  public:
-  CudaDevice(DeviceInfo description, int index, const DeviceRequest& request) {
-    info = std::move(description);
-    target_.ordinal = index;
-    target_.name = info.name;
-    target_.max_samples = request.max_samples_per_dispatch > 0 ? request.max_samples_per_dispatch
-                                                               : default_max_samples(index);
+  CudaDevice(int index, const DeviceRequest& request) : target_(cuda_target(index, request)) {
+    info = describe_cuda_device(index);
     const CurrentDevice current(index, info.name);
     check(cudaFree(nullptr), info.name, "be started");  // makes the context
   }
@@ -131,7 +127,7 @@ std::vector<DeviceInfo> list_cuda_devices(std::string* why_none) {
 
 bool cuda_driver_found() { return driver_version() > 0; }
 
-std::unique_ptr<Device::Implementation> open_cuda_device(int index, const DeviceRequest& request) {
+CudaTarget cuda_target(int index, const DeviceRequest& request) {
   std::string why_none;
   const int count = count_devices(why_none);
   if (count == 0) throw Error("No CUDA device: " + why_none);
@@ -139,11 +135,18 @@ std::unique_ptr<Device::Implementation> open_cuda_device(int index, const Device
     throw Error("There is no CUDA device " + std::to_string(index) + "; this machine has " +
                 std::to_string(count) + ", counted from 0.");
   }
-  DeviceInfo info = describe_cuda_device(index);
+  const DeviceInfo info = describe_cuda_device(index);
   if (!info.unusable.empty()) {
     throw Error("The CUDA device " + info.name + " cannot be used: " + info.unusable);
   }
-  return std::make_unique<CudaDevice>(std::move(info), index, request);
+  const long long asked = request.max_samples_per_dispatch;
+  return {.ordinal = index,
+          .name = info.name,
+          .max_samples = asked > 0 ? asked : default_max_samples(index)};
+}
+
+std::unique_ptr<Device::Implementation> open_cuda_device(int index, const DeviceRequest& request) {
+  return std::make_unique<CudaDevice>(index, request);
 }
 
 }  // namespace widestereo

@@ -16,7 +16,7 @@
 namespace widestereo::test {
 namespace {
 
-constexpr const char* other_devices[] = {"vulkan"};
+constexpr const char* other_devices[] = {"vulkan", "cuda"};
 
 Options small_options(const RenderedPair&) {
   Options options;
@@ -275,7 +275,7 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
   expect_no_validation_messages(*device);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan"));
+INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan", "cuda"));
 
 TEST(Checkerboard, ReachesRasterOrder) {
   Device cpu = Device::open("cpu");
@@ -298,6 +298,8 @@ TEST(Checkerboard, ReachesRasterOrder) {
 TEST(DeviceChoice, UnknownNamesAreErrors) {
   EXPECT_THROW(Device::open("gpu"), Error);
   EXPECT_THROW(Device::open("vulkan:no such device"), Error);
+  EXPECT_THROW(Device::open("cuda:no such device"), Error);
+  EXPECT_THROW(Device::open("cudax"), Error);
   EXPECT_THROW(Device::open(""), Error);
 }
 
