@@ -90,21 +90,27 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
               "\"; there are: " + names_of(devices) + ".");
 }
 
-/// Someone without an NVIDIA driver need not read of CUDA, unless there is no GPU at all.
-std::string why_not_cuda() {
+/// Which CUDA devices cannot be used and why. Someone without an NVIDIA driver need not read of CUDA.
+std::string unusable_cuda_devices() {
   if (!cuda_driver_found()) return "";
   std::string why;
-  return list_cuda_devices(&why).empty() ? "No CUDA device: " + why + " " : "";
+  const std::vector<DeviceInfo> devices = list_cuda_devices(&why);
+  if (devices.empty()) return "No CUDA device: " + why + " ";
+  std::string unusable;
+  for (const DeviceInfo& device : devices) {
+    if (!device.unusable.empty()) unusable += device.name + ": " + device.unusable + " ";
+  }
+  return unusable;
 }
 
 std::unique_ptr<Device::Implementation> open_best(const DeviceRequest& request) {
-  std::string passed_over = why_not_cuda();
+  std::string passed_over = unusable_cuda_devices();
   bool any_vulkan = false;
   for (const DeviceInfo& device : Device::list()) {
     if (device.kind == DeviceKind::cpu) continue;
     any_vulkan = any_vulkan || device.kind == DeviceKind::vulkan;
     if (!device.unusable.empty()) {
-      passed_over += device.name + ": " + device.unusable + " ";
+      if (device.kind != DeviceKind::cuda) passed_over += device.name + ": " + device.unusable + " ";
       continue;
     }
     try {

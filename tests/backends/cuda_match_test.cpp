@@ -55,7 +55,7 @@ void expect_same(const StereoResult& a, const StereoResult& b) {
 
 TEST(CudaMatch, BitsDependNeitherOnGraphsNorOnSplitting) {
   OPEN_DEVICE_OR_SKIP(device, "cuda");
-  const RenderedPair pair = render_demo(97);
+  const RenderedPair pair = render_demo(65);
   for (const Options& options : every_method()) {
     Matcher matcher(*device, pair.rig, options);
     const StereoResult first = matcher.match(images_of(pair));
@@ -190,8 +190,8 @@ class CudaApplication : public ::testing::TestWithParam<CudaPixel> {};
 
 TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
   OPEN_DEVICE_OR_SKIP(device, "cuda:0");
-  RenderedPair pair = render_demo(97);
-  const cv::Size size(97, 97);
+  RenderedPair pair = render_demo(65);
+  const cv::Size size(65, 65);
   cv::Mat mask(size, CV_8UC1, cv::Scalar(1));
   mask(cv::Rect(20, 30, 15, 10)).setTo(0);
   pair.rig.views[1].mask = mask;
@@ -226,9 +226,15 @@ TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
   CUDA_OK(cudaStreamDestroy(stream));
 }
 
+std::string name_of(const ::testing::TestParamInfo<CudaPixel>& test) {
+  constexpr const char* names[] = {"grey8", "grey16", "intensity"};
+  return names[static_cast<int>(test.param)];
+}
+
 INSTANTIATE_TEST_SUITE_P(Pixels, CudaApplication,
                          ::testing::Values(CudaPixel::grey8, CudaPixel::grey16,
-                                           CudaPixel::intensity));
+                                           CudaPixel::intensity),
+                         name_of);
 
 TEST(CudaApplication, MayCaptureAMatch) {
   OPEN_DEVICE_OR_SKIP(device, "cuda:0");

@@ -147,7 +147,8 @@ TEST_P(Parity, PyramidMatchAgrees) {
   expect_no_validation_messages(*device);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, Parity, ::testing::ValuesIn(other_devices));
+INSTANTIATE_TEST_SUITE_P(Devices, Parity, ::testing::ValuesIn(other_devices),
+                         [](const auto& test) { return std::string(test.param); });
 
 class EveryDevice : public ::testing::TestWithParam<const char*> {};
 
@@ -275,7 +276,8 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
   expect_no_validation_messages(*device);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan", "cuda"));
+INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan", "cuda"),
+                         [](const auto& test) { return std::string(test.param); });
 
 TEST(Checkerboard, ReachesRasterOrder) {
   Device cpu = Device::open("cpu");
