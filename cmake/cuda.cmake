@@ -11,29 +11,29 @@ if(WIDESTEREO_CUDA)
     find_program(WIDESTEREO_NVCC nvcc HINTS $ENV{CUDA_PATH}/bin $ENV{CUDA_HOME}/bin PATHS /usr/local/cuda/bin)
     mark_as_advanced(WIDESTEREO_NVCC)
     if(WIDESTEREO_NVCC)
-      set(CMAKE_CUDA_COMPILER ${WIDESTEREO_NVCC})
+      set(ENV{CUDACXX} ${WIDESTEREO_NVCC})  # so that check_language() tries whether it works
     endif()
   endif()
-  set(architectures_given ${CMAKE_CUDA_ARCHITECTURES})
   include(CheckLanguage)
   check_language(CUDA)
   if(CMAKE_CUDA_COMPILER)
+    # Before CMake's own default: from Turing to Hopper, and later ones through PTX.
+    if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
+      set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 90-virtual CACHE STRING
+          "CUDA architectures")
+    endif()
     enable_language(CUDA)
     find_package(CUDAToolkit 11.8)
   endif()
   if(CMAKE_CUDA_COMPILER AND CUDAToolkit_FOUND)
     set(WIDESTEREO_HAS_CUDA TRUE)
-    # enable_language() sets a default of its own; ours covers Turing to Hopper, and later ones through PTX.
-    if(NOT architectures_given)
-      set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 90-virtual)
-    endif()
     string(REPLACE ";" " " architectures "${CMAKE_CUDA_ARCHITECTURES}")
     set(cuda_summary "yes, toolkit ${CUDAToolkit_VERSION}, architectures ${architectures}")
   elseif(WIDESTEREO_CUDA STREQUAL "AUTO")
-    set(cuda_summary "no (no nvcc with a CUDA toolkit of at least 11.8 found; set CMAKE_CUDA_COMPILER to one)")
+    set(cuda_summary "no (no working nvcc of a CUDA toolkit of at least 11.8 found; CMAKE_CUDA_COMPILER may name one)")
   else()
-    message(FATAL_ERROR "WIDESTEREO_CUDA is ON, but no nvcc with a CUDA toolkit of at least 11.8 was found; install "
-                        "one or set CMAKE_CUDA_COMPILER to its nvcc.")
+    message(FATAL_ERROR "WIDESTEREO_CUDA is ON, but no working nvcc of a CUDA toolkit of at least 11.8 was found; "
+                        "install one or set CMAKE_CUDA_COMPILER to it.")
   endif()
 endif()
 message(STATUS "CUDA back end: ${cuda_summary}")
@@ -51,8 +51,8 @@ target_link_libraries(widestereo_cuda PUBLIC widestereo_settings)
 list(APPEND component_targets widestereo_cuda)
 
 if(WIDESTEREO_HAS_CUDA)
-  # C++17, which CUDA 11 knows. Kernels may contract to fused multiply-add: back ends agree to tolerances (Vulkan
-  # drivers contract as well), and it halves the arithmetic of a patch. The maps' conversions must equal the host's.
+  # C++17, which CUDA 11 knows. Kernels may contract to fused multiply-add: back ends agree to tolerances, Vulkan
+  # drivers contract as well, and it saves instructions. The maps' conversions must equal the host's.
   set_target_properties(widestereo_cuda PROPERTIES CUDA_STANDARD 17 CUDA_STANDARD_REQUIRED ON
                         CUDA_RUNTIME_LIBRARY Static)
   target_compile_options(widestereo_cuda PRIVATE

@@ -4,8 +4,9 @@
 //   widestereo::CudaMatcher matcher(rig, options);                       // once
 //   widestereo::CudaImage images[] = {{left, left_pitch}, {right, right_pitch}};
 //   widestereo::CudaViewMaps maps[2];
-//   maps[0].distance = {distance, distance_pitch};                       // what is left out is not written
-//   matcher.enqueue(images, maps, stream);                               // per frame; returns at once
+//   maps[0].distance = {distance, distance_pitch};                       // what is left out is not
+//   written matcher.enqueue(images, maps, stream);                               // per frame;
+//   returns at once
 #pragma once
 
 #include <cstddef>
@@ -30,17 +31,19 @@ class CudaMatcher {
 
   /// Allocates all memory, compiles nothing and waits for the device. With `current_device` the
   /// same context must be current in every later call, the destructor included; with an ordinal of
-  /// the CUDA runtime its primary context is used and the thread's current device is left as it was.
-  /// Throws Error when the rig, the options or the device do not do, or CUDA is not in this build.
+  /// the CUDA runtime its primary context is used and the thread's current device is left as it
+  /// was. Throws Error when the rig, the options or the device do not do, or CUDA is not in this
+  /// build.
   CudaMatcher(const Rig& rig, const Options& options, int device = current_device);
   /// The work enqueued must have finished.
   ~CudaMatcher();
   CudaMatcher(CudaMatcher&&) noexcept;
   CudaMatcher& operator=(CudaMatcher&&) noexcept;
 
-  /// Enqueues one match: reads the images, one for each view, and writes the maps, likewise. Neither
-  /// waits nor allocates device memory, and may be captured into a graph of the application's.
-  /// Throws Error for images or maps that do not fit; where nothing overlaps, all costs are 2.
+  /// Enqueues one match: reads the images, one for each view, and writes the maps, likewise.
+  /// Neither waits nor allocates device memory, and may be captured into a graph of the
+  /// application's. Throws Error for images or maps that do not fit; where nothing overlaps, all
+  /// costs are 2.
   void enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                CUstream_st* stream);
 

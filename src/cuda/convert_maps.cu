@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Compiled without fused multiply-add, so that values equal the host's.
-#include "cuda/convert_maps.h"
-
 #include <cuda_runtime.h>
 
 #include <type_traits>
 
+#include "cuda/convert_maps.h"
 #include "kernel/maps.h"
 
 namespace widestereo {

@@ -106,9 +106,9 @@ void CudaBackend::make_maps() {
     maps.hypotheses = DeviceArray<float4>(pixels, name, "the planes");
     maps.checks = DeviceArray<float4>(pixels, name, "the consistency maps");
     maps.priors = DeviceArray<float4>(pixels, name, "the planes' priors");
-    context_.views[maps_.size() - 1] = {maps.rays.get(),   maps.intensities.get(),
+    context_.views[maps_.size() - 1] = {maps.rays.get(),       maps.intensities.get(),
                                         maps.hypotheses.get(), maps.checks.get(),
-                                        maps.priors.get(), size.width};
+                                        maps.priors.get(),     size.width};
     largest = std::max(largest, pixels);
   }
   transfer_nearest_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
@@ -138,10 +138,10 @@ void CudaBackend::upload(void* memory, int view, const cv::Mat& map, int type) {
   }
   const CurrentDevice current = make_current();
   const std::size_t row = static_cast<std::size_t>(map.cols) * map.elemSize();
-  check(cudaMemcpy2DAsync(memory, row, map.data, map.step[0], row,
-                          static_cast<std::size_t>(map.rows), cudaMemcpyHostToDevice,
-                          stream_.get()),
-        "receive a map");
+  check(
+      cudaMemcpy2DAsync(memory, row, map.data, map.step[0], row, static_cast<std::size_t>(map.rows),
+                        cudaMemcpyHostToDevice, stream_.get()),
+      "receive a map");
   check(cudaStreamSynchronize(stream_.get()), "receive a map");
 }
 
@@ -207,9 +207,9 @@ void CudaBackend::launch_all(const Schedule& schedule, std::span<const Band> ban
                              unsigned record_flags) {
   const auto record = [&] {
     if (events == Events::none) return;
-    check(cudaEventRecordWithFlags(events_.at(stretches_.size()).get(), stream_.get(),
-                                   record_flags),
-          "record an event");
+    check(
+        cudaEventRecordWithFlags(events_.at(stretches_.size()).get(), stream_.get(), record_flags),
+        "record an event");
   };
   stretches_.clear();
   for (const Band& band : bands) {
@@ -229,8 +229,7 @@ void CudaBackend::launch_all(const Schedule& schedule, std::span<const Band> ban
 void CudaBackend::load_kernels(const Schedule& schedule, std::size_t events) {
   for (const Dispatch& dispatch : schedule.dispatches) {
     cudaFuncAttributes attributes{};
-    check(cudaFuncGetAttributes(&attributes,
-                                kernel_function(dispatch.kernel, schedule.constants)),
+    check(cudaFuncGetAttributes(&attributes, kernel_function(dispatch.kernel, schedule.constants)),
           "load its kernels");
   }
   while (events_.size() < events) {

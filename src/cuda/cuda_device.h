@@ -9,8 +9,8 @@
 
 namespace widestereo {
 
-/// CUDA devices of this machine in the runtime's order (info.id "cuda:INDEX"); empty without CUDA in
-/// this build, driver or device, in which case `why_none` (may be null) says so in one sentence.
+/// CUDA devices of this machine in the runtime's order (info.id "cuda:INDEX"); empty without CUDA
+/// in this build, driver or device, in which case `why_none` (may be null) says so in one sentence.
 std::vector<DeviceInfo> list_cuda_devices(std::string* why_none);
 
 /// Whether this build and this machine's driver are there at all, so that missing devices are worth

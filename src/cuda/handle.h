@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Owners of the CUDA runtime's objects. Their owner keeps the objects' device current while they are
-// made and destroyed.
+// Owners of the CUDA runtime's objects. Their owner keeps the objects' device current while they
+// are made and destroyed.
 #pragma once
 
 #include <cuda_runtime_api.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The shared kernel source compiled for CUDA: accessors over device memory and one entry point for each
-// kernel of the schedule. No algorithm here.
+// The shared kernel source compiled for CUDA: accessors over device memory and one entry point for
+// each kernel of the schedule. No algorithm here.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -9,7 +9,8 @@
 
 namespace widestereo::kernel::cuda {
 
-/// Constants known at compile time; -1 = read from the context. Without a model each source's own is used.
+/// Constants known at compile time; -1 = read from the context. Without a model each source's own
+/// is used.
 template <int Radius, int Warp, int Pattern, int Weighted, int Model>
 struct Constants {
   static constexpr int window_radius = Radius;
@@ -33,12 +34,15 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1>;
 
 /// The algorithm as static functions of a class, which makes its constants template arguments.
 ///
-/// Intensities are read by plain loads through the read-only path: texture gathers need a CUDA array, which
-/// `downsample` could not write like memory. No kernel reads intensities or rays that it writes, as __ldg() asks;
-/// hypotheses, checks and priors are read and written by the same kernels and are loaded normally.
+/// Intensities are read by plain loads through the read-only path: texture gathers need a CUDA
+/// array, which `downsample` could not write like memory. No kernel reads intensities or rays that
+/// it writes, as __ldg() asks; hypotheses, checks and priors are read and written by the same
+/// kernels and are loaded normally.
 template <class C>
 struct Algorithm {
-  FN int index_of(CONTEXT_ARGUMENT int view, ivec2 p) { return p.y * context.views[view].width + p.x; }
+  FN int index_of(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return p.y * context.views[view].width + p.x;
+  }
   FN vec4 to_vec4(float4 v) { return vec4(v.x, v.y, v.z, v.w); }
   FN float4 to_float4(vec4 v) { return make_float4(v.x, v.y, v.z, v.w); }
 
@@ -114,14 +118,16 @@ struct Algorithm {
   }
 };
 
-#define ENTRY_POINT(name, view)                                                  \
-  template <class C>                                                             \
-  __global__ void __launch_bounds__(block_width* block_height)                   \
-      name(const __grid_constant__ Context context) {                            \
-    ivec2 pixel;                                                                 \
-    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) {         \
-      Algorithm<C>::name##_pixel(context, pixel);                                \
-    }                                                                            \
+// One block a multiprocessor is asked for: left to itself, ptxas spills registers for one block
+// more of seven.
+#define ENTRY_POINT(name, view)                                          \
+  template <class C>                                                     \
+  __global__ void __launch_bounds__(block_width* block_height, 1)        \
+      name(const __grid_constant__ Context context) {                    \
+    ivec2 pixel;                                                         \
+    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) { \
+      Algorithm<C>::name##_pixel(context, pixel);                        \
+    }                                                                    \
   }
 
 ENTRY_POINT(initialise, reference)
@@ -139,7 +145,9 @@ ENTRY_POINT(measure, reference)
 ENTRY_POINT(regress, reference)
 ENTRY_POINT(adopt, reference)
 
+// clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}
+// clang-format on
 
 template <int count>
 KernelTable table_of(const KernelEntry (&entries)[count]) {

@@ -48,9 +48,9 @@ struct KernelTable {
 /// Every kernel, for any constants.
 KernelTable generic_kernels();
 /// The kernels that take most of the time, compiled for 11x11 windows and the constants of the
-/// preset `paper` (exact warp, dense), `fast` (affine, checkerboard, weighted) or `quality` (affine,
-/// dense, weighted). `source_model`: a camera model that has kernels of its own (kannala_brandt,
-/// double_sphere), anything else selects those for all models.
+/// preset `paper` (exact warp, dense), `fast` (affine, checkerboard, weighted) or `quality`
+/// (affine, dense, weighted). `source_model`: a camera model that has kernels of its own
+/// (kannala_brandt, double_sphere), anything else selects those for all models.
 KernelTable paper_kernels(int source_model);
 KernelTable fast_kernels(int source_model);
 KernelTable quality_kernels(int source_model);

@@ -54,8 +54,7 @@ std::string names_of(const std::vector<DeviceInfo>& devices) {
 bool matches(const DeviceInfo& device, const Api& api, const std::string& wanted) {
   std::string uuid = lower_case(wanted);
   std::erase(uuid, '-');
-  return wanted.empty() || device.id == std::string(api.id) + ":" + wanted ||
-         device.uuid == uuid ||
+  return wanted.empty() || device.id == std::string(api.id) + ":" + wanted || device.uuid == uuid ||
          lower_case(device.name).find(lower_case(wanted)) != std::string::npos;
 }
 
@@ -81,8 +80,7 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
   for (const DeviceInfo& device : devices) {
     if (!matches(device, api, wanted)) continue;
     if (!device.unusable.empty()) {
-      throw Error("The " + name + " device " + device.name +
-                  " cannot be used: " + device.unusable);
+      throw Error("The " + name + " device " + device.name + " cannot be used: " + device.unusable);
     }
     return open_listed(device, request);
   }
@@ -90,7 +88,8 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
               "\"; there are: " + names_of(devices) + ".");
 }
 
-/// Which CUDA devices cannot be used and why. Someone without an NVIDIA driver need not read of CUDA.
+/// Which CUDA devices cannot be used and why. Someone without an NVIDIA driver need not read of
+/// CUDA.
 std::string unusable_cuda_devices() {
   if (!cuda_driver_found()) return "";
   std::string why;
@@ -110,7 +109,8 @@ std::unique_ptr<Device::Implementation> open_best(const DeviceRequest& request) 
     if (device.kind == DeviceKind::cpu) continue;
     any_vulkan = any_vulkan || device.kind == DeviceKind::vulkan;
     if (!device.unusable.empty()) {
-      if (device.kind != DeviceKind::cuda) passed_over += device.name + ": " + device.unusable + " ";
+      if (device.kind != DeviceKind::cuda)
+        passed_over += device.name + ": " + device.unusable + " ";
       continue;
     }
     try {
@@ -154,9 +154,10 @@ Device Device::open(const DeviceRequest& request) {
       return Device(open_matching(api, name.substr(prefix.size()), request));
     }
   }
-  throw Error("There is no device \"" + name +
-              "\"; choose auto, cpu, cuda or vulkan, either of these two also with :INDEX, :NAME or "
-              ":UUID (`widestereo devices` lists them).");
+  throw Error(
+      "There is no device \"" + name +
+      "\"; choose auto, cpu, cuda or vulkan, either of these two also with :INDEX, :NAME or "
+      ":UUID (`widestereo devices` lists them).");
 }
 
 Device Device::open(const std::string& device) {

@@ -74,8 +74,7 @@ class Matcher::Implementation {
   Implementation(Device& device, const Rig& rig, const Options& options)
       : rig_(rig),
         setup_(rig, options, device.info().kind),
-        backend_(
-            device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)) {
+        backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)) {
     setup_.set_rays(*backend_);
   }
 

@@ -173,8 +173,8 @@ struct DeviceMaps {
         confidence(size, CV_32FC1),
         reasons(size, CV_8UC1) {}
   CudaViewMaps maps() const {
-    return {distance.map<float>(), normals.map<float>(), cost.map<float>(),
-            confidence.map<float>(), reasons.map<std::uint8_t>()};
+    return {distance.map<float>(), normals.map<float>(), cost.map<float>(), confidence.map<float>(),
+            reasons.map<std::uint8_t>()};
   }
   void expect_equal(const ViewResult& expected) const {
     EXPECT_TRUE(same_bits(distance.download(), expected.distance));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What of the CUDA back end can be tested without a GPU: devices that are not there, architectures,
 // conversions, launches.
+#include "widestereo/cuda.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,7 +13,6 @@
 #include "cuda/cuda_device.h"
 #include "kernel/kernel_fixture.h"
 #include "kernel/maps.h"
-#include "widestereo/cuda.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 

@@ -21,13 +21,13 @@ inline bool is_required(const std::string& device) {
 
 /// Opens a device, or skips the test with the reason; where WIDESTEREO_REQUIRE_VULKAN (for CUDA
 /// devices WIDESTEREO_REQUIRE_CUDA) is set, a missing device or validation layer fails it instead.
-#define OPEN_DEVICE_OR_SKIP(device, name)                                \
-  std::optional<::widestereo::Device> device;                            \
-  try {                                                                  \
-    device.emplace(::widestereo::test::open_validated(name));            \
-  } catch (const ::widestereo::Error& error) {                           \
-    if (::widestereo::test::is_required(name)) FAIL() << error.what();   \
-    GTEST_SKIP() << error.what();                                        \
+#define OPEN_DEVICE_OR_SKIP(device, name)                              \
+  std::optional<::widestereo::Device> device;                          \
+  try {                                                                \
+    device.emplace(::widestereo::test::open_validated(name));          \
+  } catch (const ::widestereo::Error& error) {                         \
+    if (::widestereo::test::is_required(name)) FAIL() << error.what(); \
+    GTEST_SKIP() << error.what();                                      \
   }
 
 inline Device open_validated(const std::string& name, long max_samples_per_dispatch = 0) {

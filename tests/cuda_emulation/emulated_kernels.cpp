@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Calls kernels by their address, as a launch does.
-#include "cuda/convert_maps.cu"
-#include "emulated_runtime.h"
-
 #include <tuple>
 #include <utility>
+
+#include "cuda/convert_maps.cu"
+#include "emulated_runtime.h"
 
 namespace widestereo::test {
 namespace {
@@ -13,8 +13,7 @@ using kernel::cuda::Context;
 using kernel::cuda::KernelTable;
 
 template <class... Arguments, std::size_t... i>
-ThreadFunction bind_all(void (*kernel)(Arguments...), void** arguments,
-                        std::index_sequence<i...>) {
+ThreadFunction bind_all(void (*kernel)(Arguments...), void** arguments, std::index_sequence<i...>) {
   return [kernel, copied = std::tuple(*static_cast<Arguments*>(arguments[i])...)] {
     std::apply(kernel, copied);
   };
@@ -34,8 +33,8 @@ bool contains(const KernelTable& table, const void* function) {
 bool is_kernel_of_the_schedule(const void* function) {
   if (contains(kernel::cuda::generic_kernels(), function)) return true;
   for (const int model : {CAMERA_KANNALA_BRANDT, CAMERA_DOUBLE_SPHERE, -1}) {
-    for (const auto& get : {kernel::cuda::paper_kernels, kernel::cuda::fast_kernels,
-                            kernel::cuda::quality_kernels}) {
+    for (const auto& get :
+         {kernel::cuda::paper_kernels, kernel::cuda::fast_kernels, kernel::cuda::quality_kernels}) {
       if (contains(get(model), function)) return true;
     }
   }

@@ -76,8 +76,8 @@ bool anything_captures() {
 cudaError_t step() {
   auto& e = emulation();
   const long call = e.calls++;
-  const bool fails = e.failing_call >= 0 &&
-                     (call == e.failing_call || (e.sticky && call > e.failing_call));
+  const bool fails =
+      e.failing_call >= 0 && (call == e.failing_call || (e.sticky && call > e.failing_call));
   return fails ? e.failure : cudaSuccess;
 }
 /// Likewise, of one that must not be made while this thread captures.
@@ -309,7 +309,8 @@ cudaError_t cudaEventDestroy(cudaEvent_t event) {
 cudaError_t cudaEventRecordWithFlags(cudaEvent_t event, cudaStream_t stream, unsigned flags) {
   CUstream_st* target = resolve(stream);
   // Without the flag it would be a dependency of the capture, not a node of the graph.
-  if (target->capturing != nullptr && flags != cudaEventRecordExternal) return cudaErrorInvalidValue;
+  if (target->capturing != nullptr && flags != cudaEventRecordExternal)
+    return cudaErrorInvalidValue;
   if (target->capturing == nullptr && flags != cudaEventRecordDefault) return cudaErrorInvalidValue;
   if (const cudaError_t error = step()) return error;
   event->stream = target;

@@ -7,7 +7,7 @@
 #define __device__
 #define __global__
 #define __grid_constant__
-#define __launch_bounds__(threads)
+#define __launch_bounds__(threads, blocks)
 
 extern thread_local dim3 blockIdx;
 extern thread_local dim3 threadIdx;
