@@ -213,11 +213,12 @@ cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from,
                               cudaMemcpyKind kind, cudaStream_t stream) {
   if (const cudaError_t error = step_outside_capture()) return error;
   if (width > to_pitch || width > from_pitch) return cudaErrorInvalidValue;
+  // Ordinary host memory is filled, or staged, before the call returns.
   if (kind == cudaMemcpyDeviceToHost) {
-    enqueue(stream, [=] { copy_rows(to, to_pitch, from, from_pitch, width, height); });
+    run_all(*resolve(stream));
+    copy_rows(to, to_pitch, from, from_pitch, width, height);
     return cudaSuccess;
   }
-  // Ordinary host memory is staged before the call returns.
   std::vector<char> staged(width * height);
   copy_rows(staged.data(), width, from, from_pitch, width, height);
   enqueue(stream, [=, staged = std::move(staged)] {

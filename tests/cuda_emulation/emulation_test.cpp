@@ -49,8 +49,8 @@ class CudaEmulation : public ::testing::Test {
   }
 
   void match_in_application() {
+    std::vector<std::uint8_t> memory(24 * 24, 100);  // outlives what is enqueued
     CudaMatcher matcher(rig_, options_);
-    std::vector<std::uint8_t> memory(24 * 24, 100);
     const CudaImage image{memory.data(), 24, CudaPixel::grey8};
     const CudaImage images[] = {image, image};
     const CudaViewMaps maps[2] = {};
@@ -128,8 +128,8 @@ TEST_F(CudaEmulation, AGraphIsMadeOnceForTheSameSchedule) {
 }
 
 TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
-  CudaMatcher matcher(rig_, options_);
   std::vector<std::uint8_t> memory(24 * 24, 100);
+  CudaMatcher matcher(rig_, options_);
   const CudaImage image{memory.data(), 24, CudaPixel::grey8};
   const CudaImage images[] = {image, image};
   const CudaViewMaps maps[2] = {};
