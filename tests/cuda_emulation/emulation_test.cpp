@@ -8,6 +8,7 @@
 #include "cuda/cuda_device.h"
 #include "emulated_runtime.h"
 #include "kernel/kernel_fixture.h"
+#include "matching/backend.h"
 #include "widestereo/cuda.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -125,6 +126,33 @@ TEST_F(CudaEmulation, AGraphIsMadeOnceForTheSameSchedule) {
   matcher.match(images_, [](double) {});
   matcher.match(images_);
   EXPECT_EQ(emulation().graphs_made, 1);
+}
+
+TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
+  KernelFixture match(rig_, options_);
+  Schedule schedule = match.schedule();
+  std::vector<cv::Size> sizes;
+  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  Device device = Device::open("cuda");
+  const auto backend = device.implementation().make_backend(sizes, schedule.constants);
+  for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
+    backend->set_rays(i, ray_image(schedule.views[i].camera, {}));
+    if (i < 2) backend->set_intensity(i, smooth_noise(sizes[i], 7));
+  }
+  backend->run(schedule, {});
+  const cv::Mat expected = backend->hypotheses(0);
+  Schedule other = schedule;
+  for (Dispatch& dispatch : other.dispatches) ++dispatch.pass.seed;
+  backend->run(other, {});
+  EXPECT_GT(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  other = schedule;
+  other.parameters.range.z *= 2;
+  backend->run(other, {});
+  EXPECT_EQ(emulation().graphs_made, 3);
+  backend->run(schedule, {});
+  EXPECT_EQ(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  other.constants.window_radius = 4;
+  EXPECT_THROW(backend->run(other, {}), Error);
 }
 
 TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
