@@ -15,7 +15,7 @@ struct Vector3 {
   FN constexpr Vector3(T x_, T y_, T z_) : x(x_), y(y_), z(z_) {}
 };
 template <class T>
-struct Vector4 {
+struct alignas(16) Vector4 {  // GPUs load it at once
   T x, y, z, w;
   Vector4() = default;
   FN constexpr Vector4(T x_, T y_, T z_, T w_) : x(x_), y(y_), z(z_), w(w_) {}

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "commands.h"
 #include "widestereo/device.h"
@@ -27,7 +28,15 @@ void print_devices(bool as_json) {
     if (!device.unusable.empty()) std::cout << "  NOT USABLE: " << device.unusable;
     std::cout << "\n";
   }
-  if (as_json) std::cout << list.dump(2) << "\n";
+  if (as_json) {
+    std::cout << list.dump(2) << "\n";
+    return;
+  }
+  for (const auto& [kind, name] : {std::pair(widestereo::DeviceKind::cuda, "CUDA"),
+                                   std::pair(widestereo::DeviceKind::vulkan, "Vulkan")}) {
+    const std::string why = widestereo::Device::why_none(kind);
+    if (!why.empty()) std::cout << "No " << name << " device: " << why << "\n";
+  }
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 namespace {
 
 struct EvaluateArguments {
-  std::string prediction, normals;
+  std::string prediction, normals, confidence;
   std::string set;
   std::string truth, valid, occlusion, truth_normals, calibration;
   int view = 0, source = 1;
@@ -68,7 +68,17 @@ void run_evaluate(EvaluateArguments a) {
   }
   const std::vector<ws::RegionScores> scores =
       ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
-  std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
+  std::vector<ws::SparsificationPoint> curve;
+  if (!a.confidence.empty()) {
+    curve = ws::sparsification(prediction, ws::read_map(a.confidence), truth, rig.views[a.view],
+                               rig.views[a.source]);
+  }
+  if (a.as_json) {
+    std::cout << "{\"regions\": " << ws::to_json(scores)
+              << ", \"sparsification\": " << ws::to_json(curve) << "}\n";
+  } else {
+    std::cout << ws::to_table(scores) << ws::to_table(curve);
+  }
   if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
 }
 
@@ -80,6 +90,8 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("prediction", a->prediction, "Distance map: .tiff, .pfm or 16-bit .png in mm")
       ->required();
   command->add_option("--normals", a->normals, "Normal map to score as well");
+  command->add_option("--confidence", a->confidence,
+                      "Confidence map: prints the error of the most confident pixels");
   command->add_option("--set", a->set, "Folder with depthN.tiff, validN.png, occN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");

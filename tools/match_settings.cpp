@@ -22,7 +22,8 @@ void MatchSettings::add_to(CLI::App& command) {
   const std::string devices = "Device";
   command
       .add_option("--device", device.device,
-                  "auto, cpu, vulkan, vulkan:INDEX, vulkan:NAME PART or vulkan:UUID")
+                  "auto, cpu, cuda or vulkan, either of these two also with :INDEX, :NAME PART or "
+                  ":UUID")
       ->capture_default_str()
       ->group(devices);
   command.add_flag("--validation", device.validation, "Vulkan: run with validation layers")
@@ -33,7 +34,7 @@ void MatchSettings::add_to(CLI::App& command) {
       ->group(devices);
   command
       .add_option("--max-samples-per-dispatch", device.max_samples_per_dispatch,
-                  "Vulkan: longest dispatch in patch samples, 0 = by device type")
+                  "GPUs: longest dispatch in patch samples, 0 = by device")
       ->group(devices);
 
   const std::string matching = "Matching";

@@ -7,11 +7,11 @@
 
 namespace widestereo {
 
-enum class DeviceKind { cpu, vulkan };
+enum class DeviceKind { cpu, vulkan, cuda };
 
 struct DeviceInfo {
   DeviceKind kind = DeviceKind::cpu;
-  std::string id;        ///< what Device::open takes: "cpu", "vulkan:0"
+  std::string id;        ///< what Device::open takes: "cpu", "vulkan:0", "cuda:0"
   std::string name;      ///< as the driver says
   std::string type;      ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu"
   std::string driver;    ///< name and version, where known
@@ -20,14 +20,14 @@ struct DeviceInfo {
 };
 
 struct DeviceRequest {
-  /// "auto" (the best Vulkan device, else the CPU), "cpu", "vulkan", "vulkan:INDEX", "vulkan:NAME
-  /// PART", "vulkan:UUID".
+  /// "auto" (the best CUDA device, else the best Vulkan device, else the CPU), "cpu", "cuda",
+  /// "vulkan", and either of the two with ":INDEX", ":NAME PART" or ":UUID".
   std::string device = "auto";
   bool validation = false;  ///< Vulkan: validation layers with synchronization validation
   std::string
       pipeline_cache;  ///< Vulkan: file that keeps compiled pipelines between runs, empty for none
-  /// Vulkan: longest dispatch in patch samples, so that slow devices answer within watchdog limits;
-  /// 0 chooses by device type. The result does not depend on it.
+  /// GPUs: longest dispatch in patch samples, so that slow devices answer within watchdog limits;
+  /// 0 chooses by device. The result does not depend on it.
   long max_samples_per_dispatch = 0;
 };
 
@@ -39,6 +39,8 @@ class Device {
   static Device open(const std::string& device);
   /// All devices of this machine, best first, the CPU last. Never throws for a missing driver.
   static std::vector<DeviceInfo> list();
+  /// Why list() has no device of this kind, one sentence; empty if it has.
+  static std::string why_none(DeviceKind kind);
 
   ~Device();
   Device(Device&&) noexcept;

@@ -77,6 +77,10 @@ std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const c
                                                 const GroundTruth& truth, const View& reference,
                                                 const View& source);
 
+/// The curve as a fixed-width table (empty for no points) and as JSON text.
+std::string to_table(const std::vector<SparsificationPoint>& curve);
+std::string to_json(const std::vector<SparsificationPoint>& curve);
+
 /// BGR picture of the relative error: green <= 0.5 %, yellow about 2 %, red >= 5 %, blue = no
 /// prediction, dimmed = occluded or outside the source view, black = no ground truth.
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth);

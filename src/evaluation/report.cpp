@@ -68,6 +68,25 @@ std::string to_json(const std::vector<RegionScores>& scores) {
   return json.dump(2);
 }
 
+std::string to_table(const std::vector<SparsificationPoint>& curve) {
+  if (curve.empty()) return "";
+  std::string table = formatted("%-13s %10s %12s\n", "kept", "confidence", "bad 2 px");
+  for (const SparsificationPoint& point : curve) {
+    table += formatted("%12.0f%% %10.3f %11.2f%%\n", 100 * point.kept, point.confidence,
+                       100 * point.bad_pixels);
+  }
+  return table;
+}
+
+std::string to_json(const std::vector<SparsificationPoint>& curve) {
+  nlohmann::ordered_json json = nlohmann::json::array();
+  for (const SparsificationPoint& point : curve) {
+    json.push_back(
+        {{"kept", point.kept}, {"confidence", point.confidence}, {"bad_pixels", point.bad_pixels}});
+  }
+  return json.dump(2);
+}
+
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
   cv::Mat picture = cv::Mat::zeros(distance.size(), CV_8UC3);
   for (int y = 0; y < distance.rows; ++y) {

@@ -2,10 +2,11 @@
 #include "widestereo/device.h"
 
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <utility>
 
 #include "cpu/cpu_device.h"
+#include "cuda/cuda_device.h"
 #include "matching/backend.h"
 #include "vulkan/vulkan_device.h"
 #include "widestereo/error.h"
@@ -13,15 +14,26 @@
 namespace widestereo {
 namespace {
 
-constexpr const char* vulkan_prefix = "vulkan:";
+/// One kind of GPU interface: "cuda", "vulkan".
+struct Api {
+  DeviceKind kind;
+  const char* id;
+  const char* name;
+  std::vector<DeviceInfo> (*list)(std::string* why_none);
+  std::unique_ptr<Device::Implementation> (*open)(int index, const DeviceRequest& request);
+};
+constexpr std::array<Api, 2> apis = {
+    {{DeviceKind::cuda, "cuda", "CUDA", list_cuda_devices, open_cuda_device},
+     {DeviceKind::vulkan, "vulkan", "Vulkan", list_vulkan_devices, open_vulkan_device}}};
 
-/// Lower is better: GPUs before software devices.
+/// Lower is better: GPUs before software devices, CUDA before Vulkan.
 int rank(const DeviceInfo& info) {
   if (!info.unusable.empty()) return 9;
-  if (info.type == "discrete gpu") return 0;
-  if (info.type == "integrated gpu") return 1;
-  if (info.type == "virtual gpu") return 2;
-  return info.kind == DeviceKind::vulkan ? 3 : 4;
+  const int not_cuda = info.kind == DeviceKind::cuda ? 0 : 3;
+  if (info.type == "discrete gpu") return not_cuda;
+  if (info.type == "integrated gpu") return not_cuda + 1;
+  if (info.type == "virtual gpu") return not_cuda + 2;
+  return info.kind == DeviceKind::cpu ? 7 : 6;
 }
 
 std::string lower_case(std::string text) {
@@ -38,56 +50,79 @@ std::string names_of(const std::vector<DeviceInfo>& devices) {
   return names;
 }
 
-bool matches(const DeviceInfo& device, const std::string& wanted) {
+/// `wanted`: what follows "API:", empty for any.
+bool matches(const DeviceInfo& device, const Api& api, const std::string& wanted) {
   std::string uuid = lower_case(wanted);
   std::erase(uuid, '-');
-  return wanted.empty() || device.id == vulkan_prefix + wanted || device.uuid == uuid ||
+  return wanted.empty() || device.id == std::string(api.id) + ":" + wanted || device.uuid == uuid ||
          lower_case(device.name).find(lower_case(wanted)) != std::string::npos;
 }
 
-int index_of(const DeviceInfo& device) {
-  return std::stoi(device.id.substr(std::string(vulkan_prefix).size()));
+std::unique_ptr<Device::Implementation> open_listed(const DeviceInfo& device,
+                                                    const DeviceRequest& request) {
+  for (const Api& api : apis) {
+    if (api.kind != device.kind) continue;
+    return api.open(std::stoi(device.id.substr(std::string(api.id).size() + 1)), request);
+  }
+  return open_cpu_device();
 }
 
-std::unique_ptr<Device::Implementation> open_matching(const std::string& wanted,
+std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std::string& wanted,
                                                       const DeviceRequest& request) {
+  const std::string name = api.name;
   std::string why_none;
-  std::vector<DeviceInfo> devices = list_vulkan_devices(&why_none);
+  std::vector<DeviceInfo> devices = api.list(&why_none);
   if (devices.empty()) {
-    throw Error("No Vulkan device: " + why_none + " Or choose the device \"cpu\".");
+    throw Error("No " + name + " device: " + why_none + " Or choose the device \"cpu\".");
   }
   std::stable_sort(devices.begin(), devices.end(),
                    [](const auto& a, const auto& b) { return rank(a) < rank(b); });
   for (const DeviceInfo& device : devices) {
-    if (!matches(device, wanted)) continue;
+    if (!matches(device, api, wanted)) continue;
     if (!device.unusable.empty()) {
-      throw Error("The Vulkan device " + device.name + " cannot be used: " + device.unusable);
+      throw Error("The " + name + " device " + device.name + " cannot be used: " + device.unusable);
     }
-    return open_vulkan_device(index_of(device), request);
+    return open_listed(device, request);
   }
-  throw Error("No Vulkan device is called \"" + wanted + "\"; there are: " + names_of(devices) +
-              ".");
+  throw Error("No " + name + " device is called \"" + wanted +
+              "\"; there are: " + names_of(devices) + ".");
+}
+
+/// Which CUDA devices cannot be used and why. Someone without an NVIDIA driver need not read of
+/// CUDA.
+std::string unusable_cuda_devices() {
+  if (!cuda_driver_found()) return "";
+  std::string why;
+  const std::vector<DeviceInfo> devices = list_cuda_devices(&why);
+  if (devices.empty()) return "No CUDA device: " + why + " ";
+  std::string unusable;
+  for (const DeviceInfo& device : devices) {
+    if (!device.unusable.empty()) unusable += device.name + ": " + device.unusable + " ";
+  }
+  return unusable;
 }
 
 std::unique_ptr<Device::Implementation> open_best(const DeviceRequest& request) {
-  std::string passed_over;
+  std::string passed_over = unusable_cuda_devices();
+  bool any_vulkan = false;
   for (const DeviceInfo& device : Device::list()) {
     if (device.kind == DeviceKind::cpu) continue;
+    any_vulkan = any_vulkan || device.kind == DeviceKind::vulkan;
     if (!device.unusable.empty()) {
-      passed_over += device.name + ": " + device.unusable + " ";
+      if (device.kind != DeviceKind::cuda)
+        passed_over += device.name + ": " + device.unusable + " ";
       continue;
     }
     try {
-      auto implementation = open_vulkan_device(index_of(device), request);
+      auto implementation = open_listed(device, request);
       implementation->note = passed_over;
       return implementation;
     } catch (const Error& error) {
       passed_over += device.name + ": " + error.what() + " ";
     }
   }
-  if (passed_over.empty()) {
-    list_vulkan_devices(&passed_over);
-    passed_over = "No Vulkan device: " + passed_over + " ";
+  if (!any_vulkan) {
+    passed_over += "No Vulkan device: " + Device::why_none(DeviceKind::vulkan) + " ";
   }
   auto implementation = open_cpu_device();
   implementation->note = passed_over + "Using the CPU.";
@@ -112,13 +147,17 @@ Device Device::open(const DeviceRequest& request) {
   const std::string& name = request.device;
   if (name == "auto") return Device(open_best(request));
   if (name == "cpu") return Device(open_cpu_device());
-  if (name == "vulkan") return Device(open_matching("", request));
-  if (name.starts_with(vulkan_prefix)) {
-    return Device(open_matching(name.substr(std::string(vulkan_prefix).size()), request));
+  for (const Api& api : apis) {
+    const std::string prefix = std::string(api.id) + ":";
+    if (name == api.id) return Device(open_matching(api, "", request));
+    if (name.starts_with(prefix)) {
+      return Device(open_matching(api, name.substr(prefix.size()), request));
+    }
   }
-  throw Error("There is no device \"" + name +
-              "\"; choose auto, cpu, vulkan, vulkan:INDEX, vulkan:NAME or vulkan:UUID "
-              "(`widestereo devices` lists them).");
+  throw Error(
+      "There is no device \"" + name +
+      "\"; choose auto, cpu, cuda or vulkan, either of these two also with :INDEX, :NAME or "
+      ":UUID (`widestereo devices` lists them).");
 }
 
 Device Device::open(const std::string& device) {
@@ -128,11 +167,22 @@ Device Device::open(const std::string& device) {
 }
 
 std::vector<DeviceInfo> Device::list() {
-  std::vector<DeviceInfo> devices = list_vulkan_devices(nullptr);
+  std::vector<DeviceInfo> devices;
+  for (const Api& api : apis) {
+    for (DeviceInfo& device : api.list(nullptr)) devices.push_back(std::move(device));
+  }
   devices.push_back(cpu_device_info());
   std::stable_sort(devices.begin(), devices.end(),
                    [](const auto& a, const auto& b) { return rank(a) < rank(b); });
   return devices;
+}
+
+std::string Device::why_none(DeviceKind kind) {
+  std::string why;
+  for (const Api& api : apis) {
+    if (api.kind == kind) api.list(&why);
+  }
+  return why;
 }
 
 }  // namespace widestereo

@@ -4,15 +4,17 @@
 #include <chrono>
 #include <opencv2/core.hpp>
 
-#include "matching/backend.h"
+#include "kernel/maps.h"
+#include "matching/match_setup.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
 namespace widestereo {
 namespace {
 
-constexpr float masked_intensity = -1;
-constexpr float no_plane_cost = 2;
+using kernel::no_plane_cost;
+
+kernel::vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 
 /// Intensities with every pixel without a usable ray marked as masked.
 cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat& rays) {
@@ -26,7 +28,7 @@ cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat
   cv::Mat intensity = to_intensity(image, "The image of " + view.name);
   cv::Mat usable;
   cv::extractChannel(rays, usable, 3);
-  intensity.setTo(masked_intensity, usable == 0);
+  intensity.setTo(kernel::masked_intensity, usable == 0);
   return intensity;
 }
 
@@ -38,13 +40,12 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
   cv::extractChannel(hypotheses, result.cost, 3);
   for (int y = 0; y < hypotheses.rows; ++y) {
     for (int x = 0; x < hypotheses.cols; ++x) {
-      const cv::Vec4f& h = hypotheses(y, x);
-      const cv::Vec4f& ray = rays(y, x);
-      const cv::Vec3f m(h[0], h[1], h[2]);
-      const float w = m.dot(cv::Vec3f(ray[0], ray[1], ray[2]));
-      if (h[3] >= no_plane_cost || !(w > 0)) continue;
-      result.distance.at<float>(y, x) = 1 / w;
-      result.normals.at<cv::Vec3f>(y, x) = -m / static_cast<float>(cv::norm(m));
+      const kernel::vec4 hypothesis = to_vec4(hypotheses(y, x));
+      const float distance = kernel::plane_distance(hypothesis, to_vec4(rays(y, x)));
+      if (!(distance > 0)) continue;
+      const kernel::vec3 normal = kernel::plane_normal(hypothesis);
+      result.distance.at<float>(y, x) = distance;
+      result.normals.at<cv::Vec3f>(y, x) = {normal.x, normal.y, normal.z};
     }
   }
 }
@@ -71,21 +72,10 @@ void unpack_checks(const cv::Mat& checks, ViewResult& result) {
 class Matcher::Implementation {
  public:
   Implementation(Device& device, const Rig& rig, const Options& options)
-      : rig_(rig), schedule_(make_schedule(rig, options)) {
-    if (options.propagation == Propagation::raster && device.info().kind != DeviceKind::cpu) {
-      throw Error(
-          "Raster-order propagation is sequential and runs on the CPU only; choose the "
-          "device \"cpu\" or checkerboard propagation.");
-    }
-    std::vector<cv::Size> sizes;
-    for (const View& view : schedule_.views) {
-      sizes.emplace_back(view.camera.width, view.camera.height);
-      rays_.push_back(ray_image(view.camera, view.mask));
-    }
-    backend_ = device.implementation().make_backend(sizes, schedule_.constants);
-    for (std::size_t i = 0; i < rays_.size(); ++i) {
-      backend_->set_rays(static_cast<int>(i), rays_[i]);
-    }
+      : rig_(rig),
+        setup_(rig, options, device.info().kind),
+        backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)) {
+    setup_.set_rays(*backend_);
   }
 
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress) {
@@ -96,19 +86,19 @@ class Matcher::Implementation {
     }
     for (std::size_t i = 0; i < images.size(); ++i) {
       backend_->set_intensity(static_cast<int>(i),
-                              masked_intensities(images[i], rig_.views[i], rays_[i]));
+                              masked_intensities(images[i], rig_.views[i], setup_.rays[i]));
     }
-    backend_->run(schedule_, progress);
+    backend_->run(setup_.schedule, progress);
 
     StereoResult result;
     for (std::size_t i = 0; i < images.size(); ++i) {
       ViewResult& view = result.views.emplace_back();
       view.hypotheses = backend_->hypotheses(static_cast<int>(i));
-      unpack_hypotheses(rays_[i], view);
+      unpack_hypotheses(setup_.rays[i], view);
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
     }
     require_overlap(result.views);
-    for (const Dispatch& dispatch : schedule_.dispatches) result.samples += dispatch.samples;
+    for (const Dispatch& dispatch : setup_.schedule.dispatches) result.samples += dispatch.samples;
     result.times = backend_->times();
     result.device_bytes = backend_->device_bytes();
     result.milliseconds =
@@ -118,8 +108,7 @@ class Matcher::Implementation {
 
  private:
   Rig rig_;
-  Schedule schedule_;
-  std::vector<cv::Mat> rays_;
+  MatchSetup setup_;
   std::unique_ptr<Backend> backend_;
 };
 

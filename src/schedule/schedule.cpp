@@ -104,6 +104,12 @@ class Builder {
                   std::to_string(levels_) + " levels (" + std::to_string(MAX_VIEWS) +
                   " in all); choose fewer views or levels.");
     }
+    for (const View& view : schedule_.views) {
+      if (view.camera.width < 2 || view.camera.height < 2) {
+        throw Error("The image of " + view.name + " is too small for " + std::to_string(levels_) +
+                    " levels: the coarsest would be less than 2 pixels wide; choose fewer levels.");
+      }
+    }
     schedule_.constants = {.source_model = common_model(),
                            .window_radius = options.window_radius,
                            .warp = static_cast<int>(options.warp),

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "matching/backend.h"
-#include "vulkan/bands.h"
+#include "schedule/bands.h"
 #include "vulkan/memory.h"
 #include "vulkan/pipeline_cache.h"
 #include "vulkan/pipelines.h"

@@ -12,21 +12,28 @@
 
 namespace widestereo::test {
 
-/// Opens a device, or skips the test with the reason; where WIDESTEREO_REQUIRE_VULKAN is set, a
-/// missing Vulkan device or validation layer fails it instead.
-#define OPEN_DEVICE_OR_SKIP(device, name)                                            \
-  std::optional<::widestereo::Device> device;                                        \
-  try {                                                                              \
-    device.emplace(::widestereo::test::open_validated(name));                        \
-  } catch (const ::widestereo::Error& error) {                                       \
-    if (std::getenv("WIDESTEREO_REQUIRE_VULKAN") != nullptr) FAIL() << error.what(); \
-    GTEST_SKIP() << error.what();                                                    \
+/// Whether this machine must have the device: a missing one then fails a test instead of skipping
+/// it.
+inline bool is_required(const std::string& device) {
+  const bool cuda = device.starts_with("cuda");
+  return std::getenv(cuda ? "WIDESTEREO_REQUIRE_CUDA" : "WIDESTEREO_REQUIRE_VULKAN") != nullptr;
+}
+
+/// Opens a device, or skips the test with the reason; where WIDESTEREO_REQUIRE_VULKAN (for CUDA
+/// devices WIDESTEREO_REQUIRE_CUDA) is set, a missing device or validation layer fails it instead.
+#define OPEN_DEVICE_OR_SKIP(device, name)                              \
+  std::optional<::widestereo::Device> device;                          \
+  try {                                                                \
+    device.emplace(::widestereo::test::open_validated(name));          \
+  } catch (const ::widestereo::Error& error) {                         \
+    if (::widestereo::test::is_required(name)) FAIL() << error.what(); \
+    GTEST_SKIP() << error.what();                                      \
   }
 
 inline Device open_validated(const std::string& name, long max_samples_per_dispatch = 0) {
   DeviceRequest request;
   request.device = name;
-  request.validation = name != "cpu";
+  request.validation = name.starts_with("vulkan");
   request.max_samples_per_dispatch = max_samples_per_dispatch;
   return Device::open(request);
 }

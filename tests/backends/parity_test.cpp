@@ -16,7 +16,7 @@
 namespace widestereo::test {
 namespace {
 
-constexpr const char* other_devices[] = {"vulkan"};
+constexpr const char* other_devices[] = {"vulkan", "cuda"};
 
 Options small_options(const RenderedPair&) {
   Options options;
@@ -130,6 +130,9 @@ TEST_P(Parity, PyramidMatchAgrees) {
     Options options = Options::preset_named(preset);
     std::tie(options.min_distance, options.max_distance) = demo_distance_range();
     options.sweep_steps = 24;
+    // The images are a quarter of the usual size, and so are neighbourhood and displacements:
+    // 2 % of distance here is what 0.5 % is at 512 pixels.
+    options.regression_radius = 12;
     const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
     const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
     for (int view = 0; view < 2; ++view) {
@@ -139,7 +142,7 @@ TEST_P(Parity, PyramidMatchAgrees) {
       cv::Mat difference;
       cv::absdiff(e.distance, a.distance, difference);
       cv::divide(difference, e.distance, difference);
-      const double agreeing = cv::countNonZero((difference <= 0.005) & sure);
+      const double agreeing = cv::countNonZero((difference <= 0.02) & sure);
       EXPECT_GT(cv::countNonZero(sure), 0.3 * static_cast<double>(sure.total())) << preset;
       EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97) << preset;
     }
@@ -147,7 +150,8 @@ TEST_P(Parity, PyramidMatchAgrees) {
   expect_no_validation_messages(*device);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, Parity, ::testing::ValuesIn(other_devices));
+INSTANTIATE_TEST_SUITE_P(Devices, Parity, ::testing::ValuesIn(other_devices),
+                         [](const auto& test) { return std::string(test.param); });
 
 class EveryDevice : public ::testing::TestWithParam<const char*> {};
 
@@ -242,6 +246,11 @@ TEST_P(EveryDevice, RejectsWhatItCannotMatch) {
   Options bad = options;
   bad.max_distance = 0.1;
   EXPECT_THROW(Matcher(*device, pair.rig, bad), Error);
+  Options deep = Options::preset_named("fast");
+  deep.levels = 4;
+  deep.level_iterations = deep.level_regressions = {1, 1, 1, 1};
+  EXPECT_THROW(Matcher(*device, render_demo(8).rig, deep), Error)
+      << "1 pixel at the coarsest level";
   Rig alone = pair.rig;
   alone.views.pop_back();
   EXPECT_THROW(Matcher(*device, alone, options), Error);
@@ -275,7 +284,8 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
   expect_no_validation_messages(*device);
 }
 
-INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan"));
+INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan", "cuda"),
+                         [](const auto& test) { return std::string(test.param); });
 
 TEST(Checkerboard, ReachesRasterOrder) {
   Device cpu = Device::open("cpu");
@@ -298,6 +308,8 @@ TEST(Checkerboard, ReachesRasterOrder) {
 TEST(DeviceChoice, UnknownNamesAreErrors) {
   EXPECT_THROW(Device::open("gpu"), Error);
   EXPECT_THROW(Device::open("vulkan:no such device"), Error);
+  EXPECT_THROW(Device::open("cuda:no such device"), Error);
+  EXPECT_THROW(Device::open("cudax"), Error);
   EXPECT_THROW(Device::open(""), Error);
 }
 

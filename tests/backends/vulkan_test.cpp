@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "vulkan/bands.h"
+#include "schedule/bands.h"
 #include "vulkan/instance.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"

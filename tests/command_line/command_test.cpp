@@ -214,10 +214,22 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   const Outcome outcome = run("evaluate " + file("prediction.tiff") + common +
                               " --json --error-map " + file("error.png"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json scores = nlohmann::json::parse(outcome.output);
+  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  const nlohmann::json& scores = record["regions"];
+  EXPECT_TRUE(record["sparsification"].empty());
   EXPECT_EQ(scores[0]["bad_relative"]["0.01"], 1.0);
   EXPECT_EQ(scores[0]["bad_relative"]["0.02"], 0.0);
   EXPECT_TRUE(fs::exists(file("error.png")));
+  cv::imwrite(file("confidence.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
+  const Outcome curve = run("evaluate " + file("prediction.tiff") + common +
+                            " --json --confidence " + file("confidence.tiff"));
+  ASSERT_EQ(curve.exit_code, 0) << curve.output;
+  const nlohmann::json points = nlohmann::json::parse(curve.output)["sparsification"];
+  ASSERT_EQ(points.size(), 10u);
+  EXPECT_EQ(points[9]["confidence"], 0.5);
+  expect_error(
+      "evaluate " + file("prediction.tiff") + common + " --confidence " + file("none.tiff"),
+      "none.tiff");
   expect_error("evaluate " + file("no.tiff") + common, "no.tiff");
   expect_error("evaluate " + file("left.png") + common, "left.png");
   expect_error("evaluate " + file("prediction.tiff"), "--truth");

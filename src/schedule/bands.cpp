@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "vulkan/bands.h"
+#include "schedule/bands.h"
 
 #include <algorithm>
 
@@ -24,7 +24,7 @@ std::vector<Band> split_into_bands(const Schedule& schedule, long long max_work)
     const long long height = dispatch.height;
     const long long work_of_row = (work + height - 1) / height;
     long long rows = std::clamp(max_work / std::max(work_of_row, 1LL), 1LL, height);
-    if (rows > rows_of_workgroup) rows -= rows % rows_of_workgroup;
+    if (rows < height && rows > rows_of_workgroup) rows -= rows % rows_of_workgroup;
     for (long long first = 0; first < height; first += rows) {
       const long long last = std::min(first + rows, height);
       // Differences of running totals, so that the parts add up to the whole.

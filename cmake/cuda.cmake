@@ -1,0 +1,69 @@
+# The CUDA back end, where a CUDA toolkit is found. WIDESTEREO_CUDA: AUTO (build it where nvcc is found), ON (fail
+# without), OFF. A program with it starts and runs without an NVIDIA driver: the CUDA runtime is linked statically
+# and opens the driver when first used.
+set(WIDESTEREO_CUDA AUTO CACHE STRING "Build the CUDA back end: AUTO, ON or OFF")
+set_property(CACHE WIDESTEREO_CUDA PROPERTY STRINGS AUTO ON OFF)
+
+set(WIDESTEREO_HAS_CUDA FALSE)
+set(cuda_summary "no (WIDESTEREO_CUDA=OFF)")
+if(WIDESTEREO_CUDA)
+  if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
+    find_program(WIDESTEREO_NVCC nvcc HINTS $ENV{CUDA_PATH}/bin $ENV{CUDA_HOME}/bin PATHS /usr/local/cuda/bin)
+    mark_as_advanced(WIDESTEREO_NVCC)
+    if(WIDESTEREO_NVCC)
+      set(ENV{CUDACXX} ${WIDESTEREO_NVCC})  # so that check_language() tries whether it works
+    endif()
+  endif()
+  include(CheckLanguage)
+  check_language(CUDA)
+  if(CMAKE_CUDA_COMPILER)
+    # Before CMake's own default: from Turing to Hopper, and later ones through PTX.
+    if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
+      set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 90-virtual CACHE STRING
+          "CUDA architectures")
+    endif()
+    enable_language(CUDA)
+    find_package(CUDAToolkit 11.8)
+  endif()
+  if(CMAKE_CUDA_COMPILER AND CUDAToolkit_FOUND)
+    set(WIDESTEREO_HAS_CUDA TRUE)
+    string(REPLACE ";" " " architectures "${CMAKE_CUDA_ARCHITECTURES}")
+    set(cuda_summary "yes, toolkit ${CUDAToolkit_VERSION}, architectures ${architectures}")
+  elseif(WIDESTEREO_CUDA STREQUAL "AUTO")
+    set(cuda_summary "no (no working nvcc of a CUDA toolkit of at least 11.8 found; CMAKE_CUDA_COMPILER may name one)")
+  else()
+    message(FATAL_ERROR "WIDESTEREO_CUDA is ON, but no working nvcc of a CUDA toolkit of at least 11.8 was found; "
+                        "install one or set CMAKE_CUDA_COMPILER to it.")
+  endif()
+endif()
+message(STATUS "CUDA back end: ${cuda_summary}")
+
+file(GLOB cuda_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/cuda/*.cpp)
+if(WIDESTEREO_HAS_CUDA)
+  list(REMOVE_ITEM cuda_sources ${PROJECT_SOURCE_DIR}/src/cuda/without_cuda.cpp)
+  file(GLOB kernel_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/cuda/*.cu)
+  list(APPEND cuda_sources ${kernel_sources})
+else()
+  set(cuda_sources ${PROJECT_SOURCE_DIR}/src/cuda/without_cuda.cpp ${PROJECT_SOURCE_DIR}/src/cuda/architectures.cpp)
+endif()
+add_library(widestereo_cuda OBJECT ${cuda_sources})
+target_link_libraries(widestereo_cuda PUBLIC widestereo_settings)
+list(APPEND component_targets widestereo_cuda)
+
+if(WIDESTEREO_HAS_CUDA)
+  # C++17, which CUDA 11 knows. Kernels may contract to fused multiply-add: back ends agree to tolerances, Vulkan
+  # drivers contract as well, and it saves instructions. The maps' conversions must equal the host's.
+  set_target_properties(widestereo_cuda PROPERTIES CUDA_STANDARD 17 CUDA_STANDARD_REQUIRED ON
+                        CUDA_RUNTIME_LIBRARY Static)
+  target_compile_options(widestereo_cuda PRIVATE
+    "$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=-Wall;-Xfatbin=-compress-all>")
+  if(WIDESTEREO_WARNINGS_AS_ERRORS)
+    target_compile_options(widestereo_cuda PRIVATE
+      "$<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings;-Xcompiler=-Werror>")
+  endif()
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/convert_maps.cu PROPERTIES COMPILE_OPTIONS -fmad=false)
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/architectures.cpp PROPERTIES COMPILE_DEFINITIONS
+                              "WIDESTEREO_CUDA_ARCHITECTURES=\"${architectures}\"")
+  target_compile_definitions(widestereo_cuda PUBLIC WIDESTEREO_HAS_CUDA)
+  target_link_libraries(widestereo_cuda PUBLIC CUDA::cudart_static)
+endif()

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// Matching inside a CUDA application: its stream, its device memory, no copies through the host.
+//
+//   widestereo::CudaMatcher matcher(rig, options);                       // once
+//   widestereo::CudaImage images[] = {{left, left_pitch}, {right, right_pitch}};
+//   widestereo::CudaViewMaps maps[2];
+//   maps[0].distance = {distance, distance_pitch};                       // what is left out is not
+//   written matcher.enqueue(images, maps, stream);                               // per frame;
+//   returns at once
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+
+#include "widestereo/cuda_maps.h"
+#include "widestereo/options.h"
+#include "widestereo/rig.h"
+
+struct CUstream_st;  // cudaStream_t is a pointer to it
+
+namespace widestereo {
+
+/// Matches images of one rig on an application's streams. Not thread-safe; frames of one matcher
+/// must follow each other: on one stream, or on several that wait for each other. Results equal a
+/// Matcher's on the same device.
+class CudaMatcher {
+ public:
+  /// The device and context that are current in the calling thread.
+  static constexpr int current_device = -1;
+
+  /// Allocates all memory, compiles nothing and waits for the device. With `current_device` the
+  /// same context must be current in every later call, the destructor included; with an ordinal of
+  /// the CUDA runtime its primary context is used and the thread's current device is left as it
+  /// was. Throws Error when the rig, the options or the device do not do, or CUDA is not in this
+  /// build.
+  CudaMatcher(const Rig& rig, const Options& options, int device = current_device);
+  /// The work enqueued must have finished.
+  ~CudaMatcher();
+  CudaMatcher(CudaMatcher&&) noexcept;
+  CudaMatcher& operator=(CudaMatcher&&) noexcept;
+
+  /// Enqueues one match: reads the images, one for each view, and writes the maps, likewise.
+  /// Neither waits nor allocates device memory, and may be captured into a graph of the
+  /// application's. Throws Error for images or maps that do not fit; where nothing overlaps, all
+  /// costs are 2.
+  void enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
+               CUstream_st* stream);
+
+  std::size_t device_bytes() const;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace widestereo

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+// Compiled without fused multiply-add, so that values equal the host's.
+#include <cuda_runtime.h>
+
+#include <type_traits>
+
+#include "cuda/convert_maps.h"
+#include "kernel/maps.h"
+
+namespace widestereo {
+namespace {
+
+using namespace kernel;
+using kernel::cuda::ViewMemory;
+
+constexpr int block_width = 32;
+constexpr int block_height = 8;
+
+template <class T>
+__device__ T* at(T* data, std::size_t pitch, int x, int y, int channels = 1) {
+  using Byte = std::conditional_t<std::is_const_v<T>, const char, char>;
+  Byte* row = reinterpret_cast<Byte*>(data) + static_cast<std::size_t>(y) * pitch;
+  return reinterpret_cast<T*>(row) + static_cast<std::size_t>(x) * channels;
+}
+
+template <class T>
+__device__ T read(const CudaImage& image, int x, int y) {
+  return *at(static_cast<const T*>(image.data), image.pitch, x, y);
+}
+
+__device__ bool thread_pixel(int width, int height, int& x, int& y) {
+  x = static_cast<int>(blockIdx.x * block_width + threadIdx.x);
+  y = static_cast<int>(blockIdx.y * block_height + threadIdx.y);
+  return x < width && y < height;
+}
+
+__global__ void import_pixel(CudaImage image, ViewMemory view, int height) {
+  int x;
+  int y;
+  if (!thread_pixel(view.width, height, x, y)) return;
+  float intensity = masked_intensity;
+  if (image.pixel == CudaPixel::grey8) {
+    intensity = static_cast<float>(read<std::uint8_t>(image, x, y)) * scale_of_8_bits;
+  } else if (image.pixel == CudaPixel::grey16) {
+    intensity = static_cast<float>(read<std::uint16_t>(image, x, y)) * scale_of_16_bits;
+  } else {
+    const float value = read<float>(image, x, y);
+    if (value >= 0 && value < above_intensity) intensity = value;
+  }
+  const int index = y * view.width + x;
+  view.intensities[index] = view.rays[index].w == 0 ? masked_intensity : intensity;
+}
+
+__global__ void export_pixel(ViewMemory view, CudaViewMaps maps, int height) {
+  int x;
+  int y;
+  if (!thread_pixel(view.width, height, x, y)) return;
+  const int index = y * view.width + x;
+  const float4 h = view.hypotheses[index];
+  const float4 r = view.rays[index];
+  const float4 checked = view.checks[index];
+  const vec4 hypothesis(h.x, h.y, h.z, h.w);
+  const float distance = plane_distance(hypothesis, vec4(r.x, r.y, r.z, r.w));
+  if (maps.distance.data != nullptr) *at(maps.distance.data, maps.distance.pitch, x, y) = distance;
+  if (maps.normals.data != nullptr) {
+    vec3 normal(0, 0, 0);
+    if (distance > 0) normal = plane_normal(hypothesis);
+    float* xyz = at(maps.normals.data, maps.normals.pitch, x, y, 3);
+    xyz[0] = normal.x;
+    xyz[1] = normal.y;
+    xyz[2] = normal.z;
+  }
+  if (maps.cost.data != nullptr) *at(maps.cost.data, maps.cost.pitch, x, y) = h.w;
+  if (maps.confidence.data != nullptr) {
+    *at(maps.confidence.data, maps.confidence.pitch, x, y) = checked.z;
+  }
+  if (maps.reasons.data != nullptr) {
+    *at(maps.reasons.data, maps.reasons.pitch, x, y) = static_cast<std::uint8_t>(checked.w);
+  }
+}
+
+dim3 grid_of(int width, int height) {
+  return dim3(static_cast<unsigned>((width + block_width - 1) / block_width),
+              static_cast<unsigned>((height + block_height - 1) / block_height));
+}
+
+}  // namespace
+
+// Not <<<>>>, whose errors mix with earlier ones of the application's.
+cudaError_t import_image(const CudaImage& image, const ViewMemory& view, int height,
+                         cudaStream_t stream) {
+  CudaImage image_argument = image;
+  ViewMemory view_argument = view;
+  void* arguments[] = {&image_argument, &view_argument, &height};
+  return cudaLaunchKernel(reinterpret_cast<const void*>(&import_pixel), grid_of(view.width, height),
+                          dim3(block_width, block_height), arguments, 0, stream);
+}
+
+cudaError_t export_maps(const ViewMemory& view, const CudaViewMaps& maps, int height,
+                        cudaStream_t stream) {
+  ViewMemory view_argument = view;
+  CudaViewMaps maps_argument = maps;
+  void* arguments[] = {&view_argument, &maps_argument, &height};
+  return cudaLaunchKernel(reinterpret_cast<const void*>(&export_pixel), grid_of(view.width, height),
+                          dim3(block_width, block_height), arguments, 0, stream);
+}
+
+}  // namespace widestereo

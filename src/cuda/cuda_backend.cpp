@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: MIT
+#include "cuda/cuda_backend.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "cuda/launch.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+std::size_t area(cv::Size size) {
+  return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+}
+
+bool same_launches(const Schedule& a, const Schedule& b) {
+  return a.constants == b.constants &&
+         std::memcmp(&a.parameters, &b.parameters, sizeof a.parameters) == 0 &&
+         std::equal(a.dispatches.begin(), a.dispatches.end(), b.dispatches.begin(),
+                    b.dispatches.end(), [](const Dispatch& x, const Dispatch& y) {
+                      return x.kernel == y.kernel && x.width == y.width && x.height == y.height &&
+                             std::memcmp(&x.pass, &y.pass, sizeof x.pass) == 0;
+                    });
+}
+
+/// Ends a capture that an exception left open, so that the stream is usable again.
+class Capture {
+ public:
+  explicit Capture(cudaStream_t stream) : stream_(stream) {}
+  ~Capture() {
+    if (stream_ != nullptr) end();
+  }
+  Capture(const Capture&) = delete;
+  Capture& operator=(const Capture&) = delete;
+  cudaError_t begin() {
+    const cudaError_t result = cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal);
+    if (result != cudaSuccess) stream_ = nullptr;
+    return result;
+  }
+  CudaGraph end() {
+    cudaGraph_t graph = nullptr;
+    result_ = cudaStreamEndCapture(std::exchange(stream_, nullptr), &graph);
+    return CudaGraph(graph);
+  }
+  cudaError_t result() const { return result_; }
+
+ private:
+  cudaStream_t stream_;
+  cudaError_t result_ = cudaSuccess;
+};
+
+}  // namespace
+
+CudaBackend::CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
+                         const KernelConstants& constants)
+    : target_(std::move(target)), sizes_(sizes), constants_(constants) {
+  if (sizes.size() > MAX_VIEWS) {
+    throw Error("A match has " + std::to_string(sizes.size()) + " views; at most " +
+                std::to_string(MAX_VIEWS) + " are possible.");
+  }
+  const CurrentDevice current = make_current();
+  cudaStream_t stream = nullptr;
+  check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "make a stream");
+  stream_.reset(stream);
+  make_maps();
+  context_.window_radius = constants.window_radius;
+  context_.warp = constants.warp;
+  context_.pattern = constants.pattern;
+  context_.weighted = constants.weighted;
+  context_.view_count = constants.view_count;
+  // The maps were cleared on the default stream, which the others do not wait for.
+  check(cudaDeviceSynchronize(), "clear the maps");
+}
+
+CudaBackend::~CudaBackend() {
+  try {
+    const CurrentDevice current = make_current();
+    cudaStreamSynchronize(stream_.get());
+    graph_.reset();
+    events_.clear();
+    maps_.clear();
+    parameters_ = {};
+    transfer_nearest_ = {};
+    transfer_winner_ = {};
+    stream_.reset();
+  } catch (const Error&) {  // the device is lost and its memory with it
+  }
+}
+
+void CudaBackend::check(cudaError_t result, const char* action) const {
+  widestereo::check(result, target_.name, action);
+}
+
+void CudaBackend::make_maps() {
+  std::size_t largest = 0;
+  for (const cv::Size& size : sizes_) {
+    const std::size_t pixels = area(size);
+    const std::string& name = target_.name;
+    ViewMaps& maps = maps_.emplace_back();
+    maps.rays = DeviceArray<float4>(pixels, name, "the viewing rays");
+    maps.intensities = DeviceArray<float>(pixels, name, "the images");
+    maps.hypotheses = DeviceArray<float4>(pixels, name, "the planes");
+    maps.checks = DeviceArray<float4>(pixels, name, "the consistency maps");
+    maps.priors = DeviceArray<float4>(pixels, name, "the planes' priors");
+    context_.views[maps_.size() - 1] = {maps.rays.get(),       maps.intensities.get(),
+                                        maps.hypotheses.get(), maps.checks.get(),
+                                        maps.priors.get(),     size.width};
+    largest = std::max(largest, pixels);
+  }
+  transfer_nearest_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
+  transfer_winner_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
+  parameters_ = DeviceArray<kernel::MatchParameters>(1, target_.name, "the parameters");
+  context_.transfer_nearest = transfer_nearest_.get();
+  context_.transfer_winner = transfer_winner_.get();
+  context_.parameters = parameters_.get();
+}
+
+std::size_t CudaBackend::device_bytes() const {
+  std::size_t bytes = transfer_nearest_.bytes() + transfer_winner_.bytes() + parameters_.bytes();
+  for (const ViewMaps& maps : maps_) {
+    bytes += maps.rays.bytes() + maps.intensities.bytes() + maps.hypotheses.bytes() +
+             maps.checks.bytes() + maps.priors.bytes();
+  }
+  return bytes;
+}
+
+void CudaBackend::upload(void* memory, int view, const cv::Mat& map, int type) {
+  const cv::Size expected = size(view);
+  if (map.size() != expected || map.type() != type) {
+    throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) +
+                "x" + std::to_string(map.rows) + " of type " + cv::typeToString(map.type()) +
+                ", but " + std::to_string(expected.width) + "x" + std::to_string(expected.height) +
+                " of " + cv::typeToString(type) + " is needed.");
+  }
+  const CurrentDevice current = make_current();
+  const std::size_t row = static_cast<std::size_t>(map.cols) * map.elemSize();
+  check(
+      cudaMemcpy2DAsync(memory, row, map.data, map.step[0], row, static_cast<std::size_t>(map.rows),
+                        cudaMemcpyHostToDevice, stream_.get()),
+      "receive a map");
+  check(cudaStreamSynchronize(stream_.get()), "receive a map");
+}
+
+cv::Mat CudaBackend::download(const void* memory, int view) {
+  const CurrentDevice current = make_current();
+  cv::Mat map(size(view), CV_32FC4);
+  check(cudaMemcpyAsync(map.data, memory, map.total() * map.elemSize(), cudaMemcpyDeviceToHost,
+                        stream_.get()),
+        "send a map");
+  check(cudaStreamSynchronize(stream_.get()), "send a map");
+  return map;
+}
+
+void CudaBackend::set_rays(int view, const cv::Mat& rays) {
+  upload(maps_.at(static_cast<std::size_t>(view)).rays.get(), view, rays, CV_32FC4);
+}
+void CudaBackend::set_intensity(int view, const cv::Mat& intensity) {
+  upload(maps_.at(static_cast<std::size_t>(view)).intensities.get(), view, intensity, CV_32FC1);
+}
+void CudaBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
+  upload(maps_.at(static_cast<std::size_t>(view)).hypotheses.get(), view, hypotheses, CV_32FC4);
+}
+cv::Mat CudaBackend::hypotheses(int view) {
+  return download(maps_.at(static_cast<std::size_t>(view)).hypotheses.get(), view);
+}
+cv::Mat CudaBackend::checks(int view) {
+  return download(maps_.at(static_cast<std::size_t>(view)).checks.get(), view);
+}
+
+void CudaBackend::set_parameters(const Schedule& schedule) {
+  if (!(schedule.constants == constants_)) {
+    throw Error(
+        "The schedule was made for other kernel constants than this matcher; make a new one.");
+  }
+  check(cudaMemcpyAsync(parameters_.get(), &schedule.parameters, sizeof schedule.parameters,
+                        cudaMemcpyHostToDevice, stream_.get()),
+        "receive the parameters");
+}
+
+void CudaBackend::launch(const Schedule& schedule, const Band& band) {
+  const Dispatch& dispatch = *band.dispatch;
+  kernel::cuda::Context context = context_;
+  context.pass = dispatch.pass;
+  context.pass.first_row = band.first_row;
+  context.pass.last_row = band.last_row;
+  const LaunchGrid grid =
+      launch_grid(dispatch.width, band.last_row - band.first_row, dispatch.pass.colour);
+  std::array<void*, 1> arguments = {&context};
+  check(cudaLaunchKernel(kernel_function(dispatch.kernel, schedule.constants),
+                         dim3(grid.columns, grid.rows),
+                         dim3(kernel::cuda::block_width, kernel::cuda::block_height),
+                         arguments.data(), 0, stream_.get()),
+        (std::string("launch the kernel ") + to_string(dispatch.kernel)).c_str());
+}
+
+std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {
+  return split_into_bands(schedule, target_.max_samples > 0
+                                        ? target_.max_samples
+                                        : std::numeric_limits<long long>::max());
+}
+
+void CudaBackend::launch_all(const Schedule& schedule, std::span<const Band> bands, Events events,
+                             unsigned record_flags) {
+  const auto record = [&] {
+    if (events == Events::none) return;
+    check(
+        cudaEventRecordWithFlags(events_.at(stretches_.size()).get(), stream_.get(), record_flags),
+        "record an event");
+  };
+  stretches_.clear();
+  for (const Band& band : bands) {
+    const Kernel kernel = band.dispatch->kernel;
+    if (stretches_.empty() || stretches_.back().kernel != kernel ||
+        events == Events::between_launches) {
+      record();
+      stretches_.push_back({kernel, 0, 0});
+    }
+    if (band.first_row == 0) ++stretches_.back().dispatches;
+    stretches_.back().samples += band.samples;
+    launch(schedule, band);
+  }
+  record();
+}
+
+void CudaBackend::load_kernels(const Schedule& schedule, std::size_t events) {
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    cudaFuncAttributes attributes{};
+    check(cudaFuncGetAttributes(&attributes, kernel_function(dispatch.kernel, schedule.constants)),
+          "load its kernels");
+  }
+  while (events_.size() < events) {
+    cudaEvent_t event = nullptr;
+    check(cudaEventCreate(&event), "make an event");
+    events_.emplace_back(event);
+  }
+}
+
+bool CudaBackend::graph_is_of(const Schedule& schedule, Events events) const {
+  return graph_ != nullptr && graph_events_ == events && same_launches(graph_schedule_, schedule);
+}
+
+void CudaBackend::make_graph(const Schedule& schedule, Events events) {
+  graph_.reset();
+  const std::vector<Band> bands = bands_of(schedule);
+  load_kernels(schedule, bands.size() + 1);  // nothing but launches while capturing
+  Capture capture(stream_.get());
+  check(capture.begin(), "begin a graph");
+  // External: a node of the graph, so that each launch of the graph takes the time anew.
+  launch_all(schedule, bands, events, cudaEventRecordExternal);
+  const CudaGraph graph = capture.end();
+  check(capture.result(), "capture a graph");
+  cudaGraphExec_t exec = nullptr;
+  check(cudaGraphInstantiateWithFlags(&exec, graph.get(), 0), "make a graph");
+  graph_.reset(exec);
+  graph_events_ = events;
+  graph_schedule_ = schedule;
+}
+
+void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
+  const CurrentDevice current = make_current();
+  times_.clear();
+  set_parameters(schedule);
+  if (progress) {
+    const std::vector<Band> bands = bands_of(schedule);
+    load_kernels(schedule, bands.size() + 1);
+    launch_all(schedule, bands, Events::between_launches, cudaEventRecordDefault);
+  } else {
+    if (!graph_is_of(schedule, Events::between_kernels)) {
+      make_graph(schedule, Events::between_kernels);
+    }
+    check(cudaGraphLaunch(graph_.get(), stream_.get()), "launch a match");
+  }
+  collect(schedule, progress);
+}
+
+void CudaBackend::collect(const Schedule& schedule, const Matcher::Progress& progress) {
+  ScheduleProgress done(schedule, progress);
+  if (!progress) check(cudaStreamSynchronize(stream_.get()), "match");
+  for (std::size_t i = 0; i < stretches_.size(); ++i) {
+    const Stretch& stretch = stretches_[i];
+    check(cudaEventSynchronize(events_[i + 1].get()), "match");
+    float milliseconds = 0;
+    check(cudaEventElapsedTime(&milliseconds, events_[i].get(), events_[i + 1].get()),
+          "read the time");
+    times_.add(stretch.kernel, stretch.dispatches, static_cast<double>(milliseconds));
+    done.advance(stretch.samples);
+  }
+}
+
+void CudaBackend::prepare(const Schedule& schedule) {
+  const CurrentDevice current = make_current();
+  set_parameters(schedule);
+  if (!graph_is_of(schedule, Events::none)) make_graph(schedule, Events::none);
+  check(cudaStreamSynchronize(stream_.get()), "prepare a match");
+}
+
+void CudaBackend::enqueue(cudaStream_t stream) {
+  const CurrentDevice current = make_current();
+  if (graph_ == nullptr || graph_events_ != Events::none) {
+    throw Error("Nothing was prepared for " + target_.name + "; call prepare() first.");
+  }
+  check(cudaGraphLaunch(graph_.get(), stream), "launch a match");
+}
+
+}  // namespace widestereo

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cuda/cuda_target.h"
+#include "cuda/handle.h"
+#include "cuda/kernels.h"
+#include "matching/backend.h"
+#include "schedule/bands.h"
+
+namespace widestereo {
+
+/// Device memory and kernels for matches of fixed sizes. Not thread-safe. Work goes to a stream of
+/// its own, except for enqueue().
+class CudaBackend final : public Backend {
+ public:
+  /// Throws Error naming the device and what it lacks.
+  CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
+              const KernelConstants& constants);
+  ~CudaBackend() override;
+
+  void set_rays(int view, const cv::Mat& rays) override;
+  void set_intensity(int view, const cv::Mat& intensity) override;
+  /// Without a progress function the schedule is launched as one graph, which is kept for further
+  /// runs of the same schedule; with one, kernel by kernel. Neither waits between kernels.
+  void run(const Schedule& schedule, const Matcher::Progress& progress) override;
+  cv::Mat hypotheses(int view) override;
+  void set_hypotheses(int view, const cv::Mat& hypotheses) override;
+  cv::Mat checks(int view) override;
+  std::vector<KernelTime> times() const override { return times_.list(); }
+  std::size_t device_bytes() const override;
+
+  /// Makes the graph that enqueue() launches; waits. run() replaces it.
+  void prepare(const Schedule& schedule);
+  /// Launches the prepared graph on a stream; waits for nothing and allocates nothing.
+  void enqueue(cudaStream_t stream);
+  /// Device memory of a view, for kernels that fill and read the maps on the same stream.
+  const kernel::cuda::ViewMemory& memory(int view) const { return context_.views[view]; }
+  cv::Size size(int view) const { return sizes_.at(static_cast<std::size_t>(view)); }
+  const CudaTarget& target() const { return target_; }
+
+ private:
+  struct ViewMaps {
+    DeviceArray<float4> rays, hypotheses, checks, priors;
+    DeviceArray<float> intensities;
+  };
+  /// Consecutive launches between two events.
+  struct Stretch {
+    Kernel kernel = Kernel::initialise;
+    int dispatches = 0;
+    long long samples = 0;
+  };
+  enum class Events { none, between_kernels, between_launches };
+
+  CurrentDevice make_current() const { return CurrentDevice(target_.ordinal, target_.name); }
+  void check(cudaError_t result, const char* action) const;
+  void make_maps();
+  void upload(void* memory, int view, const cv::Mat& map, int type);
+  cv::Mat download(const void* memory, int view);
+  void set_parameters(const Schedule& schedule);
+  std::vector<Band> bands_of(const Schedule& schedule) const;
+  void load_kernels(const Schedule& schedule, std::size_t events);
+  void launch_all(const Schedule& schedule, std::span<const Band> bands, Events events,
+                  unsigned record_flags);
+  void launch(const Schedule& schedule, const Band& band);
+  bool graph_is_of(const Schedule& schedule, Events events) const;
+  void make_graph(const Schedule& schedule, Events events);
+  void collect(const Schedule& schedule, const Matcher::Progress& progress);
+
+  CudaTarget target_;
+  std::vector<cv::Size> sizes_;
+  KernelConstants constants_;
+  CudaStream stream_;
+  std::vector<ViewMaps> maps_;
+  DeviceArray<unsigned> transfer_nearest_;
+  DeviceArray<unsigned> transfer_winner_;
+  DeviceArray<kernel::MatchParameters> parameters_;
+  kernel::cuda::Context context_{};  // all but the pass, which differs by launch
+  std::vector<CudaEvent> events_;
+  std::vector<Stretch> stretches_;  // of the last launch_all(): between events_ i and i + 1
+  CudaGraphExec graph_;
+  Schedule graph_schedule_;
+  Events graph_events_ = Events::none;
+  KernelTimes times_;
+};
+
+}  // namespace widestereo

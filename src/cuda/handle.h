@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Owners of the CUDA runtime's objects. Their owner keeps the objects' device current while they
+// are made and destroyed.
+#pragma once
+
+#include <cuda_runtime_api.h>
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <type_traits>
+
+#include "cuda/result.h"
+
+namespace widestereo {
+
+/// Makes a device current in this thread for a scope; -1 leaves whichever is current.
+class CurrentDevice {
+ public:
+  CurrentDevice(int ordinal, const std::string& name) {
+    if (ordinal < 0) return;
+    check(cudaGetDevice(&previous_), name, "be found by the CUDA runtime");
+    if (previous_ != ordinal) check(cudaSetDevice(ordinal), name, "be made current");
+    changed_ = previous_ != ordinal;
+  }
+  ~CurrentDevice() {
+    if (changed_) cudaSetDevice(previous_);
+  }
+  CurrentDevice(const CurrentDevice&) = delete;
+  CurrentDevice& operator=(const CurrentDevice&) = delete;
+
+ private:
+  int previous_ = 0;
+  bool changed_ = false;
+};
+
+template <auto destroy>
+struct CudaDestroy {
+  template <class T>
+  void operator()(T* object) const {
+    destroy(object);
+  }
+};
+using CudaStream =
+    std::unique_ptr<std::remove_pointer_t<cudaStream_t>, CudaDestroy<&cudaStreamDestroy>>;
+using CudaEvent =
+    std::unique_ptr<std::remove_pointer_t<cudaEvent_t>, CudaDestroy<&cudaEventDestroy>>;
+using CudaGraph =
+    std::unique_ptr<std::remove_pointer_t<cudaGraph_t>, CudaDestroy<&cudaGraphDestroy>>;
+using CudaGraphExec =
+    std::unique_ptr<std::remove_pointer_t<cudaGraphExec_t>, CudaDestroy<&cudaGraphExecDestroy>>;
+
+/// Device memory of a number of T, all zero.
+template <class T>
+class DeviceArray {
+ public:
+  DeviceArray() = default;
+  DeviceArray(std::size_t count, const std::string& device, const std::string& purpose)
+      : bytes_(count * sizeof(T)) {
+    void* memory = nullptr;
+    const std::string action =
+        "allocate " + std::to_string((bytes_ >> 20) + 1) + " MiB for " + purpose;
+    check(cudaMalloc(&memory, bytes_), device, action);
+    memory_.reset(static_cast<T*>(memory));
+    check(cudaMemset(memory, 0, bytes_), device, "clear " + purpose);
+  }
+
+  T* get() const { return memory_.get(); }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  struct Free {
+    void operator()(T* memory) const { cudaFree(memory); }
+  };
+  std::unique_ptr<T, Free> memory_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace widestereo

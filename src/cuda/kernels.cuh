@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: MIT
+// The shared kernel source compiled for CUDA: accessors over device memory and one entry point for
+// each kernel of the schedule. No algorithm here.
+#pragma once
+
+#include <cuda_runtime.h>
+
+#include "cuda/kernels.h"
+
+namespace widestereo::kernel::cuda {
+
+/// Constants known at compile time; -1 = read from the context. Without a model each source's own
+/// is used.
+template <int Radius, int Warp, int Pattern, int Weighted, int Model>
+struct Constants {
+  static constexpr int window_radius = Radius;
+  static constexpr int warp = Warp;
+  static constexpr int pattern = Pattern;
+  static constexpr int weighted = Weighted;
+  static constexpr int source_model = Model;
+};
+using AnyConstants = Constants<-1, -1, -1, -1, -1>;
+
+#define WINDOW_RADIUS (C::window_radius >= 0 ? C::window_radius : context.window_radius)
+#define WARP (C::warp >= 0 ? C::warp : context.warp)
+#define PATTERN (C::pattern >= 0 ? C::pattern : context.pattern)
+#define WEIGHTED (C::weighted >= 0 ? C::weighted : context.weighted)
+#define SOURCE_MODEL C::source_model
+#define VIEW_COUNT context.view_count
+#undef PARAMETERS
+#define PARAMETERS (*context.parameters)
+#undef FN
+#define FN static __device__ inline
+
+/// The algorithm as static functions of a class, which makes its constants template arguments.
+///
+/// Intensities are read by plain loads through the read-only path: texture gathers need a CUDA
+/// array, which `downsample` could not write like memory. No kernel reads intensities or rays that
+/// it writes, as __ldg() asks; hypotheses, checks and priors are read and written by the same
+/// kernels and are loaded normally.
+template <class C>
+struct Algorithm {
+  FN int index_of(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return p.y * context.views[view].width + p.x;
+  }
+  FN vec4 to_vec4(float4 v) { return vec4(v.x, v.y, v.z, v.w); }
+  FN float4 to_float4(vec4 v) { return make_float4(v.x, v.y, v.z, v.w); }
+
+  FN vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return to_vec4(__ldg(context.views[view].rays + index_of(CONTEXT view, p)));
+  }
+  FN float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return __ldg(context.views[view].intensities + index_of(CONTEXT view, p));
+  }
+  FN vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+    const float* top = context.views[view].intensities + index_of(CONTEXT view, p);
+    const float* bottom = top + context.views[view].width;
+    return vec4(__ldg(top), __ldg(top + 1), __ldg(bottom), __ldg(bottom + 1));
+  }
+  FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
+    context.views[view].intensities[index_of(CONTEXT view, p)] = intensity;
+  }
+  FN vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return to_vec4(context.views[view].hypotheses[index_of(CONTEXT view, p)]);
+  }
+  FN void store_hypothesis(CONTEXT_ARGUMENT int view, ivec2 p, vec4 h) {
+    context.views[view].hypotheses[index_of(CONTEXT view, p)] = to_float4(h);
+  }
+  FN vec4 check_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return to_vec4(context.views[view].checks[index_of(CONTEXT view, p)]);
+  }
+  FN void store_check(CONTEXT_ARGUMENT int view, ivec2 p, vec4 c) {
+    context.views[view].checks[index_of(CONTEXT view, p)] = to_float4(c);
+  }
+  FN vec4 prior_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return to_vec4(context.views[view].priors[index_of(CONTEXT view, p)]);
+  }
+  FN void store_prior(CONTEXT_ARGUMENT int view, ivec2 p, vec4 m) {
+    context.views[view].priors[index_of(CONTEXT view, p)] = to_float4(m);
+  }
+  FN int transfer_index(CONTEXT_ARGUMENT ivec2 p) { return index_of(CONTEXT PASS.reference, p); }
+  FN void transfer_reset(CONTEXT_ARGUMENT ivec2 p) {
+    context.transfer_nearest[transfer_index(CONTEXT p)] = 0u;
+    context.transfer_winner[transfer_index(CONTEXT p)] = 0xffffffffu;
+  }
+  FN uint transfer_nearest_at(CONTEXT_ARGUMENT ivec2 p) {
+    return context.transfer_nearest[transfer_index(CONTEXT p)];
+  }
+  FN void transfer_nearest_raise(CONTEXT_ARGUMENT ivec2 p, uint bits) {
+    atomicMax(context.transfer_nearest + transfer_index(CONTEXT p), bits);
+  }
+  FN uint transfer_winner_at(CONTEXT_ARGUMENT ivec2 p) {
+    return context.transfer_winner[transfer_index(CONTEXT p)];
+  }
+  FN void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
+    atomicMin(context.transfer_winner + transfer_index(CONTEXT p), index);
+  }
+
+  // The order matters.
+  // clang-format off
+#include "random.glsl"
+#include "plane.glsl"
+#include "patch.glsl"
+#include "search.glsl"
+#include "pyramid.glsl"
+#include "adaptive_search.glsl"
+#include "consistency.glsl"
+#include "regression.glsl"
+#include "transfer.glsl"
+#include "check.glsl"
+  // clang-format on
+
+  /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
+  FN bool thread_pixel(CONTEXT_ARGUMENT int view, ivec2& pixel) {
+    pixel = ivec2(static_cast<int>(blockIdx.x * block_width + threadIdx.x),
+                  static_cast<int>(blockIdx.y * block_height + threadIdx.y) + PASS.first_row);
+    if (PASS.colour >= 0) pixel.x = 2 * pixel.x + ((pixel.y + PASS.colour) & 1);
+    return pixel.x < PARAMETERS.cameras[view].size.x && pixel.y < PASS.last_row;
+  }
+};
+
+// One block a multiprocessor is asked for: left to itself, ptxas spills registers for one block
+// more of seven.
+#define ENTRY_POINT(name, view)                                          \
+  template <class C>                                                     \
+  __global__ void __launch_bounds__(block_width* block_height, 1)        \
+      name(const __grid_constant__ Context context) {                    \
+    ivec2 pixel;                                                         \
+    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) { \
+      Algorithm<C>::name##_pixel(context, pixel);                        \
+    }                                                                    \
+  }
+
+ENTRY_POINT(initialise, reference)
+ENTRY_POINT(iterate, reference)
+ENTRY_POINT(transfer_clear, reference)
+ENTRY_POINT(transfer_nearest, other)
+ENTRY_POINT(transfer_winner, other)
+ENTRY_POINT(transfer_gather, reference)
+ENTRY_POINT(check, reference)
+ENTRY_POINT(downsample, reference)
+ENTRY_POINT(sweep, reference)
+ENTRY_POINT(upsample, reference)
+ENTRY_POINT(search, reference)
+ENTRY_POINT(measure, reference)
+ENTRY_POINT(regress, reference)
+ENTRY_POINT(adopt, reference)
+
+// clang-format off
+#define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}
+// clang-format on
+
+template <int count>
+KernelTable table_of(const KernelEntry (&entries)[count]) {
+  return {entries, count};
+}
+
+/// Calls `get`, a callable over a Constants tag, with those of a source model.
+template <int Radius, int Warp, int Pattern, int Weighted, class Get>
+KernelTable for_model(int source_model, Get get) {
+  switch (source_model) {
+    case CAMERA_KANNALA_BRANDT:
+      return get(Constants<Radius, Warp, Pattern, Weighted, CAMERA_KANNALA_BRANDT>());
+    case CAMERA_DOUBLE_SPHERE:
+      return get(Constants<Radius, Warp, Pattern, Weighted, CAMERA_DOUBLE_SPHERE>());
+    default:
+      return get(Constants<Radius, Warp, Pattern, Weighted, -1>());
+  }
+}
+
+/// The kernels of the coarse-to-fine search that evaluate patches.
+template <class C>
+KernelTable pyramid_kernels() {
+  static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C), KERNEL_ENTRY(upsample, C),
+                                        KERNEL_ENTRY(search, C), KERNEL_ENTRY(adopt, C)};
+  return table_of(entries);
+}
+
+}  // namespace widestereo::kernel::cuda

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// What the host must know to launch the CUDA kernels.
+#pragma once
+
+#include <vector_types.h>
+
+#include "kernel/host.h"
+
+namespace widestereo::kernel::cuda {
+
+/// Threads of a block: pixels of a column, or every other one with a colour.
+constexpr int block_width = 16;
+constexpr int block_height = 8;
+
+/// Device memory of one view, row-major, `width` pixels a row.
+struct ViewMemory {
+  const float4* rays;
+  float* intensities;
+  float4* hypotheses;
+  float4* checks;
+  float4* priors;
+  int width;
+};
+
+/// What a kernel sees besides its pixel: the one argument of every kernel.
+struct Context {
+  /// In device memory: 14 KB exceed the 4 KiB of arguments that CUDA allows before 12.1.
+  const MatchParameters* parameters;
+  PassParameters pass;
+  ViewMemory views[MAX_VIEWS];
+  uint* transfer_nearest;  ///< of the reference view
+  uint* transfer_winner;
+  int window_radius, warp, pattern, weighted;
+  int view_count;
+};
+static_assert(sizeof(Context) <= 4096);
+
+/// The entry points of one instance of the kernels.
+struct KernelEntry {
+  const char* name;  ///< as to_string(Kernel) says
+  const void* function;
+};
+struct KernelTable {
+  const KernelEntry* entries;
+  int count;
+};
+
+/// Window radii of the presets that have kernels of their own.
+inline constexpr int paper_window_radius = 5;
+inline constexpr int pyramid_window_radius = 4;
+
+/// Every kernel, for any constants.
+KernelTable generic_kernels();
+/// The kernels that take most of the time, compiled for the window and the constants of the
+/// preset `paper` (exact warp, dense), `fast` (affine, checkerboard, weighted) or `quality`
+/// (affine, dense, weighted). `source_model`: a camera model that has kernels of its own
+/// (kannala_brandt, double_sphere), anything else selects those for all models.
+KernelTable paper_kernels(int source_model);
+KernelTable fast_kernels(int source_model);
+KernelTable quality_kernels(int source_model);
+
+}  // namespace widestereo::kernel::cuda

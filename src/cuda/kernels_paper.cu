@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+#include "cuda/kernels.cuh"
+
+namespace widestereo::kernel::cuda {
+namespace {
+
+struct Get {
+  template <class C>
+  KernelTable operator()(C) const {
+    static const KernelEntry entries[] = {KERNEL_ENTRY(iterate, C)};
+    return table_of(entries);
+  }
+};
+
+}  // namespace
+
+KernelTable paper_kernels(int source_model) {
+  return for_model<paper_window_radius, WARP_EXACT, 0, 0>(source_model, Get());
+}
+
+}  // namespace widestereo::kernel::cuda

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "cuda/result.h"
+
+#include <cuda_runtime_api.h>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+
+std::string explain(cudaError_t result) {
+  const std::string name = std::string(" (") + cudaGetErrorName(result) + ")";
+  switch (result) {
+    case cudaErrorMemoryAllocation:
+      return "out of device memory; use smaller images, fewer levels or another device.";
+    case cudaErrorNoKernelImageForDevice:
+    case cudaErrorInvalidDeviceFunction:
+    case cudaErrorUnsupportedPtxVersion:
+      return "this build has no kernels for its architecture; build with CMAKE_CUDA_ARCHITECTURES "
+             "for it, or update the driver" +
+             name + ".";
+    case cudaErrorDevicesUnavailable:
+      return "it is busy or its compute mode forbids use; close the program that holds it or set "
+             "the mode with nvidia-smi -c 0" +
+             name + ".";
+    case cudaErrorLaunchTimeout:
+      return "a kernel ran into the display's time limit; open the device again with smaller "
+             "dispatches (max_samples_per_dispatch).";
+    // After these nothing works on the device until the process ends.
+    case cudaErrorIllegalAddress:
+    case cudaErrorLaunchFailure:
+    case cudaErrorHardwareStackError:
+    case cudaErrorIllegalInstruction:
+    case cudaErrorMisalignedAddress:
+    case cudaErrorInvalidAddressSpace:
+    case cudaErrorInvalidPc:
+    case cudaErrorECCUncorrectable:
+    case cudaErrorAssert:
+    case cudaErrorUnknown:
+      return "the device was lost" + name +
+             "; restart the program, and check the driver's log if this repeats.";
+    default:
+      return std::string(cudaGetErrorString(result)) + name + ".";
+  }
+}
+
+void check(cudaError_t result, const std::string& device, const std::string& action) {
+  if (result == cudaSuccess) return;
+  cudaGetLastError();
+  throw Error(device + " could not " + action + ": " + explain(result));
+}
+
+}  // namespace widestereo

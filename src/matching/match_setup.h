@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// What every matcher is made of before its back end: schedule, sizes and rays.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "matching/backend.h"
+#include "schedule/schedule.h"
+
+namespace widestereo {
+
+struct MatchSetup {
+  /// Throws Error when rig or options are invalid or do not suit a device of this kind.
+  MatchSetup(const Rig& rig, const Options& options, DeviceKind kind);
+  void set_rays(Backend& backend) const;
+
+  Schedule schedule;
+  std::vector<cv::Size> sizes;  ///< of each view at each level
+  std::vector<cv::Mat> rays;    ///< likewise
+};
+
+}  // namespace widestereo

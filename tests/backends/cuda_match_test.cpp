@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+// Matches on a CUDA device; skipped without one.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "device_fixture.h"
+#include "matching/backend.h"
+#include "vulkan_fixture.h"
+#include "widestereo/cuda.h"
+#include "widestereo/image_io.h"
+#include "widestereo/matcher.h"
+#include "widestereo/synthesis.h"
+
+#ifdef WIDESTEREO_HAS_CUDA
+#include <cuda_runtime_api.h>
+
+namespace widestereo::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+#define CUDA_OK(call) ASSERT_EQ(call, cudaSuccess)
+
+std::vector<Options> every_method() {
+  std::vector<Options> list;
+  for (const std::string& preset : Options::preset_names()) {
+    Options options = Options::preset_named(preset);
+    std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+    options.first_iterations = 3;
+    options.second_iterations = 2;
+    options.sweep_steps = 24;
+    list.push_back(options);
+  }
+  list.back().window_radius = 3;  // no kernels of its own
+  return list;
+}
+
+std::vector<cv::Mat> images_of(const RenderedPair& pair) {
+  std::vector<cv::Mat> images;
+  for (const RenderedView& view : pair.views) images.push_back(view.image);
+  return images;
+}
+
+void expect_same(const StereoResult& a, const StereoResult& b) {
+  ASSERT_EQ(a.views.size(), b.views.size());
+  for (std::size_t i = 0; i < a.views.size(); ++i) {
+    EXPECT_TRUE(same_bits(a.views[i].hypotheses, b.views[i].hypotheses));
+    EXPECT_TRUE(same_bits(a.views[i].confidence, b.views[i].confidence));
+    EXPECT_TRUE(same_bits(a.views[i].reasons, b.views[i].reasons));
+  }
+}
+
+TEST(CudaMatch, BitsDependNeitherOnGraphsNorOnSplitting) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda");
+  const RenderedPair pair = render_demo(65);
+  for (const Options& options : every_method()) {
+    Matcher matcher(*device, pair.rig, options);
+    const StereoResult first = matcher.match(images_of(pair));
+    expect_same(first, matcher.match(images_of(pair)));  // the same graph again
+    double done = 0;
+    const StereoResult watched =
+        matcher.match(images_of(pair), [&done](double share) { done = share; });
+    EXPECT_DOUBLE_EQ(done, 1);
+    expect_same(first, watched);
+    expect_same(first, matcher.match(images_of(pair)));
+    Device splitting = open_validated("cuda", 5000);
+    expect_same(first, Matcher(splitting, pair.rig, options).match(images_of(pair)));
+  }
+}
+
+TEST(CudaMatch, TimesEveryKernelInBothWays) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda");
+  const RenderedPair pair = render_demo(128);
+  for (const Options& options : every_method()) {
+    Matcher matcher(*device, pair.rig, options);
+    const StereoResult graph = matcher.match(images_of(pair));
+    const StereoResult watched = matcher.match(images_of(pair), [](double) {});
+    ASSERT_EQ(graph.times.size(), watched.times.size());
+    for (std::size_t i = 0; i < graph.times.size(); ++i) {
+      EXPECT_EQ(graph.times[i].kernel, watched.times[i].kernel);
+      EXPECT_EQ(graph.times[i].dispatches, watched.times[i].dispatches);
+      EXPECT_GT(graph.times[i].milliseconds, 0) << graph.times[i].kernel;
+      EXPECT_GT(watched.times[i].milliseconds, 0) << graph.times[i].kernel;
+    }
+    EXPECT_GT(graph.device_bytes, 128u * 128u * 2u * 68u);
+  }
+}
+
+TEST(CudaMatch, AnAbortedRunLeavesTheMatcherUsable) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda");
+  const RenderedPair pair = render_demo(96);
+  Matcher matcher(*device, pair.rig, every_method()[0]);
+  const StereoResult first = matcher.match(images_of(pair));
+  EXPECT_THROW(matcher.match(images_of(pair), [](double) { throw Error("stop"); }), Error);
+  expect_same(first, matcher.match(images_of(pair)));
+}
+
+TEST(CudaMatch, MatchersLeaveNoMemoryBehind) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda");
+  const RenderedPair pair = render_demo(96);
+  std::size_t before = 0;
+  std::size_t after = 0;
+  std::size_t total = 0;
+  for (int i = 0; i < 12; ++i) {
+    Matcher(*device, pair.rig, every_method()[0]).match(images_of(pair));
+    if (i == 1) {  // kernels are loaded by now
+      CUDA_OK(cudaMemGetInfo(&before, &total));
+    }
+  }
+  CUDA_OK(cudaMemGetInfo(&after, &total));
+  const std::size_t of_others = 4u << 20;  // ten matchers would be 16 MiB
+  EXPECT_LE(before, after + of_others);
+}
+
+TEST(CudaMatch, TooLittleMemoryIsAnErrorThatLeavesTheDeviceUsable) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda");
+  std::size_t available = 0;
+  std::size_t total = 0;
+  CUDA_OK(cudaMemGetInfo(&available, &total));
+  // 68 bytes a pixel do not fit twice where one view's rays alone take all there is.
+  const int side = static_cast<int>(std::sqrt(static_cast<double>(total) / 16));
+  const std::vector<cv::Size> sizes(4, cv::Size(side, side));
+  const std::string error =
+      error_of([&] { device->implementation().make_backend(sizes, KernelConstants{}); });
+  EXPECT_THAT(error, HasSubstr("out of device memory"));
+  EXPECT_THAT(error, HasSubstr(device->info().name));
+  const RenderedPair pair = render_demo(96);
+  EXPECT_NO_THROW(Matcher(*device, pair.rig, every_method()[0]).match(images_of(pair)));
+}
+
+/// Pitched device memory, its rows padded beyond what was asked for.
+class Pitched {
+ public:
+  Pitched(cv::Size size, int type) : size_(size), type_(type) {
+    cudaMallocPitch(&data_, &pitch_, static_cast<std::size_t>(size.width) * CV_ELEM_SIZE(type),
+                    static_cast<std::size_t>(size.height));
+  }
+  ~Pitched() { cudaFree(data_); }
+  Pitched(const Pitched&) = delete;
+
+  void upload(const cv::Mat& map) {
+    cudaMemcpy2D(data_, pitch_, map.data, map.step[0], map.cols * map.elemSize(),
+                 static_cast<std::size_t>(map.rows), cudaMemcpyHostToDevice);
+  }
+  cv::Mat download() const {
+    cv::Mat map(size_, type_);
+    cudaMemcpy2D(map.data, map.step[0], data_, pitch_, map.cols * map.elemSize(),
+                 static_cast<std::size_t>(map.rows), cudaMemcpyDeviceToHost);
+    return map;
+  }
+  template <class T>
+  CudaMap<T> map() const {
+    return {static_cast<T*>(data_), pitch_};
+  }
+  CudaImage image(CudaPixel pixel) const { return {data_, pitch_, pixel}; }
+
+ private:
+  cv::Size size_;
+  int type_;
+  void* data_ = nullptr;
+  std::size_t pitch_ = 0;
+};
+
+/// All maps of one view in device memory.
+struct DeviceMaps {
+  explicit DeviceMaps(cv::Size size)
+      : distance(size, CV_32FC1),
+        normals(size, CV_32FC3),
+        cost(size, CV_32FC1),
+        confidence(size, CV_32FC1),
+        reasons(size, CV_8UC1) {}
+  CudaViewMaps maps() const {
+    return {distance.map<float>(), normals.map<float>(), cost.map<float>(), confidence.map<float>(),
+            reasons.map<std::uint8_t>()};
+  }
+  void expect_equal(const ViewResult& expected) const {
+    EXPECT_TRUE(same_bits(distance.download(), expected.distance));
+    EXPECT_TRUE(same_bits(normals.download(), expected.normals));
+    EXPECT_TRUE(same_bits(cost.download(), expected.cost));
+    EXPECT_TRUE(same_bits(confidence.download(), expected.confidence));
+    EXPECT_TRUE(same_bits(reasons.download(), expected.reasons));
+  }
+  Pitched distance, normals, cost, confidence, reasons;
+};
+
+class CudaApplication : public ::testing::TestWithParam<CudaPixel> {};
+
+TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda:0");
+  RenderedPair pair = render_demo(65);
+  const cv::Size size(65, 65);
+  cv::Mat mask(size, CV_8UC1, cv::Scalar(1));
+  mask(cv::Rect(20, 30, 15, 10)).setTo(0);
+  pair.rig.views[1].mask = mask;
+  std::vector<cv::Mat> images;
+  for (const RenderedView& view : pair.views) {
+    cv::Mat grey = to_intensity(view.image, "test");
+    if (GetParam() == CudaPixel::grey8) grey.convertTo(grey, CV_8U, 255);
+    if (GetParam() == CudaPixel::grey16) grey.convertTo(grey, CV_16U, 65535);
+    images.push_back(grey);
+  }
+  Pitched left(size, images[0].type());
+  Pitched right(size, images[1].type());
+  left.upload(images[0]);
+  right.upload(images[1]);
+  CUDA_OK(cudaDeviceSynchronize());
+  const CudaImage inputs[] = {left.image(GetParam()), right.image(GetParam())};
+  cudaStream_t stream = nullptr;
+  CUDA_OK(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+  for (const Options& options : every_method()) {
+    const StereoResult expected = Matcher(*device, pair.rig, options).match(images);
+    for (const int ordinal : {CudaMatcher::current_device, 0}) {
+      CudaMatcher matcher(pair.rig, options, ordinal);
+      const DeviceMaps first(size);
+      const DeviceMaps second(size);
+      const CudaViewMaps outputs[] = {first.maps(), second.maps()};
+      for (int frame = 0; frame < 2; ++frame) matcher.enqueue(inputs, outputs, stream);
+      CUDA_OK(cudaStreamSynchronize(stream));
+      first.expect_equal(expected.views[0]);
+      second.expect_equal(expected.views[1]);
+    }
+  }
+  CUDA_OK(cudaStreamDestroy(stream));
+}
+
+std::string name_of(const ::testing::TestParamInfo<CudaPixel>& test) {
+  constexpr const char* names[] = {"grey8", "grey16", "intensity"};
+  return names[static_cast<int>(test.param)];
+}
+
+INSTANTIATE_TEST_SUITE_P(Pixels, CudaApplication,
+                         ::testing::Values(CudaPixel::grey8, CudaPixel::grey16,
+                                           CudaPixel::intensity),
+                         name_of);
+
+TEST(CudaApplication, MayCaptureAMatch) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda:0");
+  const RenderedPair pair = render_demo(96);
+  const cv::Size size(96, 96);
+  const Options options = every_method()[0];
+  std::vector<cv::Mat> images;
+  for (const RenderedView& view : pair.views) images.push_back(to_intensity(view.image, "test"));
+  Pitched left(size, CV_32FC1);
+  Pitched right(size, CV_32FC1);
+  left.upload(images[0]);
+  right.upload(images[1]);
+  CudaMatcher matcher(pair.rig, options);
+  const DeviceMaps maps(size);
+  const CudaImage inputs[] = {left.image(CudaPixel::intensity), right.image(CudaPixel::intensity)};
+  const CudaViewMaps outputs[] = {maps.maps(), {}};
+  cudaStream_t stream = nullptr;
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t exec = nullptr;
+  CUDA_OK(cudaStreamCreate(&stream));
+  CUDA_OK(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+  matcher.enqueue(inputs, outputs, stream);
+  CUDA_OK(cudaStreamEndCapture(stream, &graph));
+  CUDA_OK(cudaGraphInstantiateWithFlags(&exec, graph, 0));
+  CUDA_OK(cudaGraphLaunch(exec, stream));
+  CUDA_OK(cudaStreamSynchronize(stream));
+  maps.expect_equal(Matcher(*device, pair.rig, options).match(images).views[0]);
+  CUDA_OK(cudaGraphExecDestroy(exec));
+  CUDA_OK(cudaGraphDestroy(graph));
+  CUDA_OK(cudaStreamDestroy(stream));
+}
+
+TEST(CudaApplication, RefusesWhatDoesNotFit) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda:0");
+  const RenderedPair pair = render_demo(96);
+  CudaMatcher matcher(pair.rig, every_method()[0]);
+  const Pitched memory({96, 96}, CV_32FC1);
+  const CudaImage good = memory.image(CudaPixel::intensity);
+  const auto error = [&](CudaImage right, CudaMap<float> distance) {
+    const CudaImage images[] = {good, right};
+    CudaViewMaps maps[2];
+    maps[0].distance = distance;
+    return error_of([&] { matcher.enqueue(images, maps, nullptr); });
+  };
+  EXPECT_THAT(error({nullptr, good.pitch, CudaPixel::intensity}, {}), HasSubstr("cam1"));
+  EXPECT_THAT(error({good.data, 96, CudaPixel::intensity}, {}), HasSubstr("pitch"));
+  EXPECT_THAT(error({good.data, 385, CudaPixel::intensity}, {}), HasSubstr("multiples of 4"));
+  EXPECT_THAT(error(good, {memory.map<float>().data, 100}), HasSubstr("distance map of cam0"));
+  const CudaImage one[] = {good};
+  EXPECT_THAT(error_of([&] { matcher.enqueue(one, {}, nullptr); }), HasSubstr("2 views"));
+}
+
+}  // namespace
+}  // namespace widestereo::test
+
+#endif

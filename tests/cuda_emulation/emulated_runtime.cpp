@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: MIT
+#include "emulated_runtime.h"
+
+#include <cuda_runtime.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <opencv2/core/utility.hpp>
+#include <set>
+#include <vector>
+
+using widestereo::test::emulation;
+using Work = std::function<void()>;
+using Clock = std::chrono::steady_clock;
+
+thread_local dim3 blockIdx;
+thread_local dim3 threadIdx;
+
+struct CUgraph_st {
+  std::vector<Work> nodes;
+};
+struct CUgraphExec_st {
+  std::vector<Work> nodes;
+};
+struct CUstream_st {
+  std::deque<Work> queue;
+  bool blocking = true;
+  CUgraph_st* capturing = nullptr;
+};
+struct CUevent_st {
+  CUstream_st* stream = nullptr;  // of the last record or of the launch of the graph with it
+  int pending = 0;
+  bool recorded = false;
+  Clock::time_point time;
+};
+
+namespace {
+
+std::map<void*, std::size_t>& allocations() {
+  static std::map<void*, std::size_t> map;
+  return map;
+}
+std::set<CUstream_st*>& streams() {
+  static std::set<CUstream_st*> set;
+  return set;
+}
+CUstream_st& default_stream() {
+  static CUstream_st stream;
+  return stream;
+}
+CUstream_st* resolve(cudaStream_t stream) { return stream ? stream : &default_stream(); }
+
+void run_all(CUstream_st& stream) {
+  while (!stream.queue.empty()) {
+    const Work work = std::move(stream.queue.front());
+    stream.queue.pop_front();
+    work();
+  }
+}
+void run_everything() {
+  run_all(default_stream());
+  for (CUstream_st* stream : streams()) run_all(*stream);
+}
+
+bool anything_captures() {
+  for (const CUstream_st* stream : streams()) {
+    if (stream->capturing != nullptr) return true;
+  }
+  return false;
+}
+
+/// The result of a call that can fail.
+cudaError_t step() {
+  auto& e = emulation();
+  const long call = e.calls++;
+  const bool fails =
+      e.failing_call >= 0 && (call == e.failing_call || (e.sticky && call > e.failing_call));
+  return fails ? e.failure : cudaSuccess;
+}
+/// Likewise, of one that must not be made while this thread captures.
+cudaError_t step_outside_capture() {
+  return anything_captures() ? cudaErrorStreamCaptureUnsupported : step();
+}
+
+void enqueue(cudaStream_t stream, Work work) {
+  CUstream_st* target = resolve(stream);
+  if (target->capturing != nullptr) {
+    target->capturing->nodes.push_back(std::move(work));
+  } else {
+    target->queue.push_back(std::move(work));
+  }
+}
+
+void copy_rows(void* to, std::size_t to_pitch, const void* from, std::size_t from_pitch,
+               std::size_t width, std::size_t height) {
+  for (std::size_t y = 0; y < height; ++y) {
+    std::memcpy(static_cast<char*>(to) + y * to_pitch,
+                static_cast<const char*>(from) + y * from_pitch, width);
+  }
+}
+
+}  // namespace
+
+namespace widestereo::test {
+
+Emulation& emulation() {
+  static Emulation state;
+  return state;
+}
+
+namespace {
+void restore() {
+  Emulation fresh;
+  fresh.allocated = emulation().allocated;
+  fresh.live_objects = emulation().live_objects;
+  emulation() = fresh;
+}
+}  // namespace
+
+EmulationScope::EmulationScope() { restore(); }
+EmulationScope::~EmulationScope() { restore(); }
+
+}  // namespace widestereo::test
+
+const char* cudaGetErrorName(cudaError_t) { return "cudaErrorEmulated"; }
+const char* cudaGetErrorString(cudaError_t) { return "emulated error"; }
+cudaError_t cudaGetLastError() { return cudaSuccess; }
+
+cudaError_t cudaDriverGetVersion(int* version) {
+  *version = emulation().driver_version;
+  return cudaSuccess;
+}
+cudaError_t cudaGetDeviceCount(int* count) {
+  *count = emulation().devices;
+  if (emulation().count_error != cudaSuccess) return emulation().count_error;
+  return *count > 0 ? step() : cudaErrorNoDevice;
+}
+cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
+  if (device < 0 || device >= emulation().devices) return cudaErrorInvalidDevice;
+  if (const cudaError_t error = step()) return error;
+  *properties = {};
+  std::strcpy(properties->name, "Emulated GPU");
+  for (int i = 0; i < 16; ++i) properties->uuid.bytes[i] = static_cast<char>(0xf0 - i + device);
+  properties->major = emulation().major;
+  return cudaSuccess;
+}
+cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int) {
+  *value = 0;
+  if (attribute == cudaDevAttrComputeMode) *value = emulation().compute_mode;
+  if (attribute == cudaDevAttrKernelExecTimeout) *value = emulation().time_limit ? 1 : 0;
+  return cudaSuccess;
+}
+cudaError_t cudaGetDevice(int* device) {
+  *device = emulation().current_device;
+  return emulation().devices > 0 ? step() : cudaErrorNoDevice;
+}
+cudaError_t cudaSetDevice(int device) {
+  if (device < 0 || device >= emulation().devices) return cudaErrorInvalidDevice;
+  emulation().current_device = device;
+  return step();
+}
+cudaError_t cudaDeviceSynchronize() {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  run_everything();
+  return cudaSuccess;
+}
+
+cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
+  *total = emulation().memory;
+  *available = emulation().memory - emulation().allocated;
+  return cudaSuccess;
+}
+cudaError_t cudaMalloc(void** memory, std::size_t bytes) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  constexpr std::size_t alignment = 256;
+  const std::size_t rounded = (bytes + alignment - 1) / alignment * alignment;
+  if (emulation().allocated + rounded > emulation().memory) return cudaErrorMemoryAllocation;
+  *memory = std::aligned_alloc(alignment, rounded);
+  std::memset(*memory, 0xcd, rounded);  // what was not cleared is seen
+  allocations()[*memory] = rounded;
+  emulation().allocated += rounded;
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaMallocPitch(void** memory, std::size_t* pitch, std::size_t width,
+                            std::size_t height) {
+  *pitch = (width / 512 + 1) * 512;
+  return cudaMalloc(memory, *pitch * height);
+}
+cudaError_t cudaFree(void* memory) {
+  if (memory == nullptr) return step();
+  run_everything();  // as the real one waits
+  emulation().allocated -= allocations().at(memory);
+  allocations().erase(memory);
+  --emulation().live_objects;
+  std::free(memory);
+  return cudaSuccess;
+}
+cudaError_t cudaMemset(void* memory, int value, std::size_t bytes) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  enqueue(nullptr, [=] { std::memset(memory, value, bytes); });
+  return cudaSuccess;
+}
+cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind,
+                            cudaStream_t stream) {
+  return cudaMemcpy2DAsync(to, bytes, from, bytes, bytes, 1, kind, stream);
+}
+cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from,
+                              std::size_t from_pitch, std::size_t width, std::size_t height,
+                              cudaMemcpyKind kind, cudaStream_t stream) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  if (width > to_pitch || width > from_pitch) return cudaErrorInvalidValue;
+  // Ordinary host memory is filled, or staged, before the call returns.
+  if (kind == cudaMemcpyDeviceToHost) {
+    run_all(*resolve(stream));
+    copy_rows(to, to_pitch, from, from_pitch, width, height);
+    return cudaSuccess;
+  }
+  std::vector<char> staged(width * height);
+  copy_rows(staged.data(), width, from, from_pitch, width, height);
+  enqueue(stream, [=, staged = std::move(staged)] {
+    copy_rows(to, to_pitch, staged.data(), width, width, height);
+  });
+  return cudaSuccess;
+}
+cudaError_t cudaMemcpy2D(void* to, std::size_t to_pitch, const void* from, std::size_t from_pitch,
+                         std::size_t width, std::size_t height, cudaMemcpyKind kind) {
+  const cudaError_t error =
+      cudaMemcpy2DAsync(to, to_pitch, from, from_pitch, width, height, kind, nullptr);
+  run_all(default_stream());
+  return error;
+}
+
+cudaError_t cudaStreamCreate(cudaStream_t* stream) { return cudaStreamCreateWithFlags(stream, 0); }
+cudaError_t cudaStreamCreateWithFlags(cudaStream_t* stream, unsigned flags) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  *stream = new CUstream_st;
+  (*stream)->blocking = flags != cudaStreamNonBlocking;
+  streams().insert(*stream);
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaStreamDestroy(cudaStream_t stream) {
+  run_all(*stream);
+  streams().erase(stream);
+  delete stream;
+  --emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  run_all(*resolve(stream));
+  return cudaSuccess;
+}
+cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
+  if (stream == nullptr || stream->capturing != nullptr) return cudaErrorInvalidValue;
+  if (const cudaError_t error = step()) return error;
+  stream->capturing = new CUgraph_st;
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
+  *graph = std::exchange(stream->capturing, nullptr);
+  if (*graph == nullptr) return cudaErrorInvalidValue;
+  if (const cudaError_t error = step()) {
+    cudaGraphDestroy(std::exchange(*graph, nullptr));
+    return error;
+  }
+  return cudaSuccess;
+}
+cudaError_t cudaGraphDestroy(cudaGraph_t graph) {
+  delete graph;
+  --emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaGraphInstantiateWithFlags(cudaGraphExec_t* exec, cudaGraph_t graph,
+                                          unsigned long long) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  *exec = new CUgraphExec_st{graph->nodes};
+  ++emulation().live_objects;
+  ++emulation().graphs_made;
+  return cudaSuccess;
+}
+cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
+  if (const cudaError_t error = step()) return error;
+  for (const Work& node : exec->nodes) enqueue(stream, node);
+  return cudaSuccess;
+}
+cudaError_t cudaGraphExecDestroy(cudaGraphExec_t exec) {
+  delete exec;
+  --emulation().live_objects;
+  return cudaSuccess;
+}
+
+cudaError_t cudaEventCreate(cudaEvent_t* event) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  *event = new CUevent_st;
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaEventDestroy(cudaEvent_t event) {
+  run_everything();  // the queues may record it
+  delete event;
+  --emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaEventRecordWithFlags(cudaEvent_t event, cudaStream_t stream, unsigned flags) {
+  CUstream_st* target = resolve(stream);
+  // Without the flag it would be a dependency of the capture, not a node of the graph.
+  if (target->capturing != nullptr && flags != cudaEventRecordExternal)
+    return cudaErrorInvalidValue;
+  if (target->capturing == nullptr && flags != cudaEventRecordDefault) return cudaErrorInvalidValue;
+  if (const cudaError_t error = step()) return error;
+  event->stream = target;
+  event->recorded = false;
+  enqueue(stream, [event] {
+    event->recorded = true;
+    event->time = Clock::now();
+  });
+  return cudaSuccess;
+}
+cudaError_t cudaEventSynchronize(cudaEvent_t event) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  if (event->stream == nullptr) return cudaSuccess;
+  while (!event->recorded && !event->stream->queue.empty()) {
+    const Work work = std::move(event->stream->queue.front());
+    event->stream->queue.pop_front();
+    work();
+  }
+  return cudaSuccess;
+}
+cudaError_t cudaEventElapsedTime(float* milliseconds, cudaEvent_t start, cudaEvent_t end) {
+  if (const cudaError_t error = step()) return error;
+  if (!start->recorded || !end->recorded) return cudaErrorNotReady;
+  *milliseconds = std::chrono::duration<float, std::milli>(end->time - start->time).count();
+  return cudaSuccess;
+}
+
+cudaError_t cudaFuncGetAttributes(cudaFuncAttributes*, const void*) {
+  return step_outside_capture();
+}
+cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void** arguments,
+                             std::size_t, cudaStream_t stream) {
+  constexpr unsigned largest_grid_height = 65535;
+  constexpr unsigned largest_block = 1024;
+  const bool legal = grid.x > 0 && grid.y > 0 && grid.z == 1 && grid.y <= largest_grid_height &&
+                     block.z == 1 && block.x * block.y > 0 && block.x * block.y <= largest_block;
+  if (!legal) return cudaErrorInvalidValue;
+  const widestereo::test::ThreadFunction thread =
+      widestereo::test::bind_kernel(function, arguments);
+  if (!thread) return cudaErrorInvalidDeviceFunction;
+  if (const cudaError_t error = step()) return error;
+  enqueue(stream, [=] {
+    ++emulation().kernels_run;
+    cv::parallel_for_(cv::Range(0, static_cast<int>(grid.y)), [&](const cv::Range& rows) {
+      for (int y = rows.start; y < rows.end; ++y) {
+        for (unsigned x = 0; x < grid.x; ++x) {
+          blockIdx = dim3(x, static_cast<unsigned>(y));
+          for (unsigned i = 0; i < block.x * block.y; ++i) {
+            threadIdx = dim3(i % block.x, i / block.x);
+            thread();
+          }
+        }
+      }
+    });
+  });
+  return cudaSuccess;
+}

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+// The host side of the CUDA back end when things go wrong, on an emulated device.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "cuda/cuda_device.h"
+#include "emulated_runtime.h"
+#include "kernel/kernel_fixture.h"
+#include "matching/backend.h"
+#include "widestereo/cuda.h"
+#include "widestereo/error.h"
+#include "widestereo/matcher.h"
+
+namespace widestereo::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string error_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+class CudaEmulation : public ::testing::Test {
+ protected:
+  CudaEmulation() : rig_(fisheye_rig(24)), options_(Options::preset_named("fast")) {
+    options_.window_radius = 2;
+    options_.sweep_steps = 4;
+    options_.levels = 2;
+    options_.level_iterations = {1, 1};
+    options_.level_regressions = {1, 1};
+    for (int i = 0; i < 2; ++i) {
+      cv::Mat image;
+      smooth_noise({24, 24}, 7).convertTo(image, CV_8U, 255);
+      images_.push_back(image);
+    }
+  }
+
+  void match() {
+    Device device = Device::open("cuda");
+    Matcher matcher(device, rig_, options_);
+    matcher.match(images_);
+    matcher.match(images_, [](double) {});
+  }
+
+  void match_in_application() {
+    std::vector<std::uint8_t> memory(24 * 24, 100);  // outlives what is enqueued
+    CudaMatcher matcher(rig_, options_);
+    const CudaImage image{memory.data(), 24, CudaPixel::grey8};
+    const CudaImage images[] = {image, image};
+    const CudaViewMaps maps[2] = {};
+    matcher.enqueue(images, maps, nullptr);
+    matcher.enqueue(images, maps, nullptr);
+    cudaDeviceSynchronize();
+  }
+
+  /// Every call in turn fails; each failure must be one sentence and leave nothing behind.
+  template <class Action>
+  void fail_every_call(Action action, cudaError_t failure, bool sticky) {
+    const int live = emulation().live_objects;
+    emulation().calls = 0;
+    action();
+    const long calls = emulation().calls;
+    ASSERT_GT(calls, 50);
+    for (long call = 0; call < calls; ++call) {
+      emulation().calls = 0;
+      emulation().failure = failure;
+      emulation().sticky = sticky;
+      emulation().failing_call = call;
+      const std::string error = error_of(action);
+      emulation().failing_call = -1;
+      EXPECT_TRUE(error.empty() || error.back() == '.') << error;
+      EXPECT_EQ(emulation().live_objects, live) << call << error;
+      EXPECT_EQ(emulation().current_device, 0);
+      failures_ += error.empty() ? 0 : 1;
+    }
+    EXPECT_GE(failures_, calls - 40);  // calls of destructors and of listings may fail unseen
+  }
+
+  EmulationScope scope_;
+  Rig rig_;
+  Options options_;
+  std::vector<cv::Mat> images_;
+  long failures_ = 0;
+};
+
+TEST_F(CudaEmulation, EveryCallMayRunOutOfMemory) {
+  fail_every_call([this] { match(); }, cudaErrorMemoryAllocation, false);
+}
+
+TEST_F(CudaEmulation, TheDeviceMayBeLostAtAnyCall) {
+  fail_every_call([this] { match(); }, cudaErrorIllegalAddress, true);
+}
+
+TEST_F(CudaEmulation, TheDeviceMayBeLostAtAnyCallOfAnApplication) {
+  fail_every_call([this] { match_in_application(); }, cudaErrorIllegalAddress, true);
+}
+
+TEST_F(CudaEmulation, AMatcherSurvivesAFailedRun) {
+  Device device = Device::open("cuda");
+  Matcher matcher(device, rig_, options_);
+  const StereoResult expected = matcher.match(images_);
+  for (int call = 0; call < 60; ++call) {
+    emulation().calls = 0;
+    emulation().failure = cudaErrorInvalidValue;
+    emulation().failing_call = call;
+    EXPECT_THAT(error_of([&] { matcher.match(images_, [](double) {}); }),
+                HasSubstr("Emulated GPU could not"));
+    emulation().failing_call = -1;
+    const StereoResult after = matcher.match(images_);
+    EXPECT_EQ(cv::norm(after.views[0].hypotheses, expected.views[0].hypotheses, cv::NORM_INF), 0);
+  }
+}
+
+TEST_F(CudaEmulation, AGraphIsMadeOnceForTheSameSchedule) {
+  Device device = Device::open("cuda");
+  Matcher matcher(device, rig_, options_);
+  for (int i = 0; i < 3; ++i) matcher.match(images_);
+  EXPECT_EQ(emulation().graphs_made, 1);
+  matcher.match(images_, [](double) {});
+  matcher.match(images_);
+  EXPECT_EQ(emulation().graphs_made, 1);
+}
+
+TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
+  KernelFixture match(rig_, options_);
+  Schedule schedule = match.schedule();
+  std::vector<cv::Size> sizes;
+  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  Device device = Device::open("cuda");
+  const auto backend = device.implementation().make_backend(sizes, schedule.constants);
+  for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
+    backend->set_rays(i, ray_image(schedule.views[i].camera, {}));
+    if (i < 2) backend->set_intensity(i, smooth_noise(sizes[i], 7));
+  }
+  backend->run(schedule, {});
+  const cv::Mat expected = backend->hypotheses(0);
+  Schedule other = schedule;
+  for (Dispatch& dispatch : other.dispatches) ++dispatch.pass.seed;
+  backend->run(other, {});
+  EXPECT_GT(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  other = schedule;
+  other.parameters.range.z *= 2;
+  backend->run(other, {});
+  EXPECT_EQ(emulation().graphs_made, 3);
+  backend->run(schedule, {});
+  EXPECT_EQ(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  other.constants.window_radius = 4;
+  EXPECT_THROW(backend->run(other, {}), Error);
+}
+
+TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
+  std::vector<std::uint8_t> memory(24 * 24, 100);
+  CudaMatcher matcher(rig_, options_);
+  const CudaImage image{memory.data(), 24, CudaPixel::grey8};
+  const CudaImage images[] = {image, image};
+  const CudaViewMaps maps[2] = {};
+  matcher.enqueue(images, maps, nullptr);
+  const int live = emulation().live_objects;
+  const int kernels = emulation().kernels_run;
+  for (int i = 0; i < 3; ++i) matcher.enqueue(images, maps, nullptr);
+  EXPECT_EQ(emulation().live_objects, live);
+  EXPECT_EQ(emulation().kernels_run, kernels);  // nothing has waited
+  cudaDeviceSynchronize();
+  EXPECT_GT(emulation().kernels_run, kernels);
+}
+
+TEST_F(CudaEmulation, TheCurrentDeviceIsLeftAlone) {
+  emulation().devices = 3;
+  emulation().current_device = 2;
+  Device device = Device::open("cuda:1");
+  EXPECT_EQ(device.info().id, "cuda:1");
+  Matcher(device, rig_, options_).match(images_);
+  CudaMatcher(rig_, options_, 0);
+  EXPECT_EQ(emulation().current_device, 2);
+}
+
+TEST_F(CudaEmulation, DevicesAreFoundByIndexNameAndUuid) {
+  emulation().devices = 2;
+  const std::vector<DeviceInfo> devices = list_cuda_devices(nullptr);
+  ASSERT_EQ(devices.size(), 2u);
+  EXPECT_NE(devices[0].uuid, devices[1].uuid);
+  EXPECT_EQ(Device::open("cuda").info().id, "cuda:0");
+  EXPECT_EQ(Device::open("cuda:emulated").info().id, "cuda:0");
+  EXPECT_EQ(Device::open("cuda:" + devices[1].uuid).info().id, "cuda:1");
+  EXPECT_EQ(Device::open("auto").info().id, "cuda:0");
+  EXPECT_EQ(Device::list().front().id, "cuda:0");
+  EXPECT_THAT(error_of([] { Device::open("cuda:7"); }), HasSubstr("cuda:1 (Emulated GPU)"));
+}
+
+TEST_F(CudaEmulation, UnusableDevicesSayWhy) {
+  emulation().major = 5;
+  EXPECT_THAT(error_of([] { Device::open("cuda"); }), HasSubstr("compute capability 5.0"));
+  EXPECT_THAT(Device::open("auto").note(), HasSubstr("compute capability 5.0"));
+  emulation().major = 9;
+  emulation().compute_mode = cudaComputeModeProhibited;
+  EXPECT_THAT(error_of([] { Device::open("cuda:0"); }), HasSubstr("nvidia-smi -c 0"));
+}
+
+TEST_F(CudaEmulation, MissingDevicesSayWhyAndAutoOnlyWithADriver) {
+  emulation().count_error = cudaErrorInsufficientDriver;
+  emulation().driver_version = 11020;
+  EXPECT_THAT(error_of([] { Device::open("cuda"); }), HasSubstr("too old: it knows CUDA 11.2"));
+  EXPECT_THAT(Device::open("auto").note(), HasSubstr("too old"));
+  emulation().driver_version = 0;
+  EXPECT_THAT(error_of([] { Device::open("cuda"); }), HasSubstr("no NVIDIA driver"));
+  EXPECT_THAT(Device::open("auto").note(), ::testing::Not(HasSubstr("CUDA")));
+  emulation().count_error = cudaErrorNoDevice;
+  emulation().driver_version = 12040;
+  EXPECT_THAT(error_of([] { Device::open("cuda"); }), HasSubstr("CUDA_VISIBLE_DEVICES"));
+}
+
+TEST_F(CudaEmulation, SplitsWhereADisplayLimitsTheTime) {
+  emulation().time_limit = true;
+  EXPECT_NO_THROW(match());
+}
+
+}  // namespace
+}  // namespace widestereo::test
