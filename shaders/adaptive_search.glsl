@@ -91,13 +91,7 @@ FN vec3 surroundings_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) {
 // The plane that the source itself holds where the pixel's point lands in it.
 FN vec3 source_plane(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
   vec3 none = vec3(0.0f, 0.0f, 0.0f);
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
-  CameraParameters camera = PARAMETERS.cameras[source];
-  vec2 position;
-  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return none;
-  ivec2 q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
-  if (!in_image(camera.size, q)) return none;
-  vec4 held = hypothesis_at(CONTEXT source, q);
+  vec4 held = hypothesis_in_source(CONTEXT source, ray, m);
   vec3 plane = vec3(held.x, held.y, held.z);
   ViewPair back = PARAMETERS.pairs[source * MAX_VIEWS + PASS.reference];
   if (held.w >= INVALID_COST || side_of_source(back, plane) <= 0.0f) return none;

@@ -9,12 +9,7 @@
 FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec3 m) {
   vec2 unknown = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
   ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
-  CameraParameters camera = PARAMETERS.cameras[source];
-  vec2 position;
-  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return unknown;
-  ivec2 q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
-  if (!in_image(camera.size, q)) return unknown;
-  vec4 other = hypothesis_at(CONTEXT source, q);
+  vec4 other = hypothesis_in_source(CONTEXT source, ray, m);
   if (other.w >= INVALID_COST) return unknown;
 
   float w = dot(m, ray);

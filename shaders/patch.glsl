@@ -46,6 +46,19 @@ FN bool warp_pixel(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int 
   return warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position);
 }
 
+// The plane (m, cost) that a source holds where the pixel's point lands in it; INVALID_COST where it lands
+// outside.
+FN vec4 hypothesis_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
+  vec4 none = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
+  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  vec2 position;
+  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return none;
+  ivec2 q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
+  if (!in_image(camera.size, q)) return none;
+  return hypothesis_at(CONTEXT source, q);
+}
+
 // Second-order map of pixel offsets into the source: u = u0 + x ux + y uy + x^2 uxx + x y uxy + y^2 uyy.
 struct PatchMap {
   vec2 u0;

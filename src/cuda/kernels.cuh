@@ -169,11 +169,13 @@ KernelTable for_model(int source_model, Get get) {
 }
 
 /// The kernels of the coarse-to-fine search that evaluate patches.
-template <class C>
-KernelTable pyramid_kernels() {
-  static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C), KERNEL_ENTRY(upsample, C),
-                                        KERNEL_ENTRY(search, C), KERNEL_ENTRY(adopt, C)};
-  return table_of(entries);
-}
+struct PyramidKernels {
+  template <class C>
+  KernelTable operator()(C) const {
+    static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C), KERNEL_ENTRY(upsample, C),
+                                          KERNEL_ENTRY(search, C), KERNEL_ENTRY(adopt, C)};
+    return table_of(entries);
+  }
+};
 
 }  // namespace widestereo::kernel::cuda

@@ -2,19 +2,8 @@
 #include "cuda/kernels.cuh"
 
 namespace widestereo::kernel::cuda {
-namespace {
-
-struct Get {
-  template <class C>
-  KernelTable operator()(C) const {
-    return pyramid_kernels<C>();
-  }
-};
-
-}  // namespace
-
 KernelTable quality_kernels(int source_model) {
-  return for_model<pyramid_window_radius, WARP_AFFINE, 0, 1>(source_model, Get());
+  return for_model<pyramid_window_radius, WARP_AFFINE, 0, 1>(source_model, PyramidKernels());
 }
 
 }  // namespace widestereo::kernel::cuda

@@ -11,6 +11,7 @@
 
 #include "cuda/architectures.h"
 #include "cuda/cuda_device.h"
+#include "error_of.h"
 #include "kernel/kernel_fixture.h"
 #include "kernel/maps.h"
 #include "widestereo/error.h"
@@ -27,15 +28,6 @@ namespace widestereo::test {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(CudaDevices, AreDescribedOrTheirAbsenceIsExplained) {
   std::string why;

@@ -33,6 +33,17 @@ std::vector<cv::Mat> images_of(const RenderedPair& pair) {
   return images;
 }
 
+/// Ties and failures differ; where both are sure of themselves their distances must agree.
+void expect_agreement(const ViewResult& expected, const ViewResult& actual, double tolerance) {
+  const cv::Mat sure = (expected.reasons == 0) & (actual.reasons == 0);
+  cv::Mat difference;
+  cv::absdiff(expected.distance, actual.distance, difference);
+  cv::divide(difference, expected.distance, difference);
+  const double agreeing = cv::countNonZero((difference <= tolerance) & sure);
+  EXPECT_GT(cv::countNonZero(sure), 0.3 * static_cast<double>(sure.total()));
+  EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97);
+}
+
 /// Runs only the first `dispatches` of a schedule and returns the hypotheses of every view.
 std::vector<cv::Mat> run_partly(Device& device, const RenderedPair& pair, Schedule schedule,
                                 std::size_t dispatches) {
@@ -109,14 +120,7 @@ TEST_P(Parity, WholeMatchAgrees) {
   for (int view = 0; view < 2; ++view) {
     const ViewResult& e = expected.views[view];
     const ViewResult& a = actual.views[view];
-    // Ties and failures differ; where both are sure of themselves they must agree.
-    const cv::Mat sure = (e.reasons == 0) & (a.reasons == 0);
-    cv::Mat difference;
-    cv::absdiff(e.distance, a.distance, difference);
-    cv::divide(difference, e.distance, difference);
-    const double agreeing = cv::countNonZero((difference <= 0.005) & sure);
-    EXPECT_GT(cv::countNonZero(sure), 0.3 * static_cast<double>(sure.total()));
-    EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97);
+    expect_agreement(e, a, 0.005);
     EXPECT_NEAR(cv::mean(e.cost)[0], cv::mean(a.cost)[0], 0.01);
   }
   expect_no_validation_messages(*device);
@@ -127,6 +131,7 @@ TEST_P(Parity, PyramidMatchAgrees) {
   Device cpu = Device::open("cpu");
   const RenderedPair pair = render_demo(129);  // odd: levels with partial last pixels
   for (const char* preset : {"fast", "quality"}) {
+    SCOPED_TRACE(preset);
     Options options = Options::preset_named(preset);
     std::tie(options.min_distance, options.max_distance) = demo_distance_range();
     options.sweep_steps = 24;
@@ -136,15 +141,7 @@ TEST_P(Parity, PyramidMatchAgrees) {
     const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
     const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
     for (int view = 0; view < 2; ++view) {
-      const ViewResult& e = expected.views[view];
-      const ViewResult& a = actual.views[view];
-      const cv::Mat sure = (e.reasons == 0) & (a.reasons == 0);
-      cv::Mat difference;
-      cv::absdiff(e.distance, a.distance, difference);
-      cv::divide(difference, e.distance, difference);
-      const double agreeing = cv::countNonZero((difference <= 0.02) & sure);
-      EXPECT_GT(cv::countNonZero(sure), 0.3 * static_cast<double>(sure.total())) << preset;
-      EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97) << preset;
+      expect_agreement(expected.views[view], actual.views[view], 0.02);
     }
   }
   expect_no_validation_messages(*device);

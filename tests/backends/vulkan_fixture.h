@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "error_of.h"
 #include "kernel/kernel_fixture.h"
 #include "vulkan/loader.h"
 #include "vulkan/vulkan_device.h"
@@ -80,17 +81,6 @@ inline cv::Mat run(Device::Implementation& device, KernelFixture& match) {
 inline bool same_bits(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
          std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
-}
-
-/// The message of the Error that `action` throws, empty if it throws none.
-template <class Action>
-std::string error_of(Action action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 /// What the faulty loader does wrong; one at a time, reset by its owner.

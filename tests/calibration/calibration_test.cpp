@@ -9,6 +9,7 @@
 #include <random>
 
 #include "data_folder.h"
+#include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 
@@ -92,12 +93,7 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 }
 
 std::string error_of(const std::filesystem::path& path) {
-  try {
-    read_calibration(path);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { read_calibration(path); });
 }
 
 TEST(Kalibr, ReadsModelsPosesAndTheFieldOfView) {

@@ -7,6 +7,7 @@
 
 #include "cuda/cuda_device.h"
 #include "emulated_runtime.h"
+#include "error_of.h"
 #include "kernel/kernel_fixture.h"
 #include "matching/backend.h"
 #include "widestereo/cuda.h"
@@ -17,15 +18,6 @@ namespace widestereo::test {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::string error_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 class CudaEmulation : public ::testing::Test {
  protected:

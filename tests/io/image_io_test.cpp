@@ -8,27 +8,19 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
 
+using test::error_of;
 using test::TemporaryFolder;
 
 std::string bytes_of(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-template <class Function>
-std::string error_of(Function function) {
-  try {
-    function();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 cv::Mat random_map(int type) {
