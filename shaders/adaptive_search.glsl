@@ -132,7 +132,8 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     if ((PASS.candidates & (1u << uint(kind))) == 0u) continue;
     vec3 m = vec3(held.x, held.y, held.z);
     held = better_of(CONTEXT pixel, ray, held,
-                     adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind));
+                     adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind),
+                     1.0f / max(speed, 1e-6f));
   }
   store_hypothesis(CONTEXT PASS.reference, pixel, held);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What is known about a pixel once all views have planes: agreement with the sources' own planes, texture,
-// parallax and tilt, summed up as reasons for rejection and a confidence.
+// What is known about a pixel once all views have planes: agreement with the sources' own planes and with the
+// surroundings, texture, ambiguity, parallax and tilt, summed up as reasons for rejection and a confidence.
 
 #define REASON_NO_RAY 1
 #define REASON_NO_OVERLAP 2
@@ -10,6 +10,15 @@
 #define REASON_UNCHECKED 32
 #define REASON_LOW_PARALLAX 64
 #define REASON_TILT 128
+#define REASON_AMBIGUOUS 256
+#define REASON_SPECKLE 512
+#define REASON_FILLED 1024
+
+// The surroundings of a pixel: a sparse grid of this radius and step.
+#define SUPPORT_RADIUS 20
+#define SUPPORT_STEP 4
+// Displacement (source pixels) up to which another plane supports the pixel's own.
+#define SUPPORT_DISPLACEMENT 1.0f
 
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -32,9 +41,8 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   return (sum_squares - sum * sum / n) / n;
 }
 
-// Pixels that the point moves in the source over the whole range of inverse distance, by the derivative at
-// its own. Zero at an epipole.
-FN float parallax_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
+// Source pixels that the point moves per unit of inverse distance, at its own. Zero at an epipole.
+FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
   float step = 0.01f * (PARAMETERS.range.w - PARAMETERS.range.z);
@@ -43,7 +51,51 @@ FN float parallax_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   vec2 there;
   if (!project(camera, camera.size.z, direction_in_source(pair, ray, w), here)) return 0.0f;
   if (!project(camera, camera.size.z, direction_in_source(pair, ray, w + step), there)) return 0.0f;
-  return 100.0f * length(there - here);
+  return length(there - here) / abs(step);
+}
+
+// Share of the surrounding planes that put the pixel's point where its own does. `speed`: source pixels per
+// unit of inverse distance.
+FN float support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
+  float planes = 0.0f;
+  float supporting = 0.0f;
+  for (int dy = -SUPPORT_RADIUS; dy <= SUPPORT_RADIUS; dy += SUPPORT_STEP) {
+    for (int dx = -SUPPORT_RADIUS; dx <= SUPPORT_RADIUS; dx += SUPPORT_STEP) {
+      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+      if ((dx == 0 && dy == 0) || !in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
+      vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+      if (plane.w >= INVALID_COST) continue;
+      planes += 1.0f;
+      float difference = plane.x * ray.x + plane.y * ray.y + plane.z * ray.z - w;
+      if (abs(difference) * speed < SUPPORT_DISPLACEMENT) supporting += 1.0f;
+    }
+  }
+  return supporting / max(planes, 1.0f);
+}
+
+// Whether the patch matches better by more than the margin at one of PASS.steps places: 2, 4, 8 ... source
+// pixels away to either side.
+FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float speed) {
+  float margin = PARAMETERS.support.z;
+  if (speed <= 0.0f) return false;
+  vec3 m = vec3(held.x, held.y, held.z);
+  float w = dot(m, ray);
+  for (int i = 0; i < PASS.steps; ++i) {
+    float pixels = float(2 << (i >> 1));
+    float there = w + ((i & 1) == 0 ? pixels : -pixels) / speed;
+    if (there < PARAMETERS.range.z || there > PARAMETERS.range.w) continue;
+    if (patch_cost(CONTEXT pixel, (there / w) * m) < held.w - margin) return true;
+  }
+  return false;
+}
+
+// Probability that the point lies within two source pixels of its true place: a logistic model of the
+// displacement from the source's own plane (px), the support of the surroundings and the variance of intensity
+// that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md).
+FN float confidence_of(float displacement, float support, float unexplained) {
+  float log_odds = 1.41f - 0.48f * log(1.0f + 4.0f * displacement) + 1.44f * log(support + 0.02f) -
+                   0.31f * log(unexplained + 1.5e-5f);
+  return 1.0f / (1.0f + exp(-log_odds));
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -59,26 +111,31 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   } else if (held.w >= INVALID_COST) {
     reasons = REASON_NO_OVERLAP;
   } else {
-    float parallax = 0.0f;
+    float speed = 0.0f;
+    float w = dot(m, ray);
     for (int source = 0; source < VIEW_COUNT; ++source) {
       if ((PASS.sources & (1u << uint(source))) == 0u) continue;
       vec2 candidate = difference_from_source(CONTEXT source, pixel, ray, m);
       if (candidate.y < difference.y) difference = candidate;
-      parallax = max(parallax, parallax_in_source(CONTEXT source, ray, dot(m, ray)));
+      speed = max(speed, speed_in_source(CONTEXT source, ray, w));
     }
     vec4 limits = PARAMETERS.check_limits;
-    if (reference_variance(CONTEXT pixel) < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
+    float variance = reference_variance(CONTEXT pixel);
+    float support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
+    bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
+    if (variance < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
     if (held.w > limits.z) reasons |= REASON_HIGH_COST;
-    if (parallax < limits.w) reasons |= REASON_LOW_PARALLAX;
-    if (dot(m, ray) < PARAMETERS.patch_limits.z * length(m)) reasons |= REASON_TILT;
-    if (difference.y >= UNKNOWN_DIFFERENCE) {
+    if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) reasons |= REASON_LOW_PARALLAX;
+    if (w < PARAMETERS.patch_limits.z * length(m)) reasons |= REASON_TILT;
+    if (unchecked) {
       reasons |= REASON_UNCHECKED;
     } else if (difference.x > limits.x || difference.y > limits.y) {
       reasons |= REASON_INCONSISTENT;
     }
-    if (reasons == 0) {
-      confidence = (1.0f - min(held.w, 1.0f)) * exp(-0.5f * difference.y * difference.y);
-    }
+    if (support < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
+    if (is_ambiguous(CONTEXT pixel, ray, held, speed)) reasons |= REASON_AMBIGUOUS;
+    confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support,
+                               variance * min(held.w, 1.0f));
   }
   store_check(CONTEXT PASS.reference, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
 }

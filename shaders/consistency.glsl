@@ -3,6 +3,8 @@
 
 // Stands for "not measurable" in maps that a person may read.
 #define UNKNOWN_DIFFERENCE 1000.0f
+// The displacement (px) that a pixel counts as where it cannot be measured.
+#define UNCHECKED_DISPLACEMENT 1.0f
 
 // Relative difference of distance (x) and displacement in reference pixels (y) between the pixel's point and
 // where the source's own plane puts it; UNKNOWN_DIFFERENCE where the source has no plane there.

@@ -14,10 +14,11 @@ struct ViewPair {
 // std140 uniform block.
 struct MatchParameters {
   vec4 range;         // min and max distance (m), min and max inverse distance (1/m)
-  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; unused
+  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; smallest support
   vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
   ivec4 search;       // distance sampling, refinements, best sources, number of views
-  vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; unused
+  vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
+                      // preference for far planes
   CameraParameters cameras[MAX_VIEWS];
   ViewPair pairs[MAX_VIEWS * MAX_VIEWS];  // [reference * MAX_VIEWS + source]: source from reference
 };
@@ -33,9 +34,9 @@ struct PassParameters {
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
-  uint candidates;  // adaptive search: bit k: candidate kind k is tried
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried; filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
                       // regression: standard deviation (px) that is enough; 0: normals only
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
-  int steps;          // sweep: inverse distances; regression: radius in pixels
+  int steps;          // sweep: inverse distances; regression, filling: radius in pixels; check: other places
 };

@@ -33,7 +33,7 @@ FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 range = PARAMETERS.range;
   for (int i = 0; i < PASS.steps; ++i) {
     float share = (float(i) + 0.5f) / float(PASS.steps);
-    best = better_of(CONTEXT pixel, ray, best, (range.z + share * (range.w - range.z)) * ray);
+    best = better_of(CONTEXT pixel, ray, best, (range.z + share * (range.w - range.z)) * ray, 0.0f);
   }
   store_hypothesis(CONTEXT PASS.reference, pixel, best);
 }
@@ -59,7 +59,7 @@ FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     } else if (best.w >= INVALID_COST) {
       m = random_plane(CONTEXT pixel, ray, 0);
     }
-    best = better_of(CONTEXT pixel, ray, best, m);
+    best = better_of(CONTEXT pixel, ray, best, m, 0.0f);
   }
   store_hypothesis(CONTEXT PASS.reference, pixel, best);
 }

@@ -8,9 +8,8 @@
 #define SMALLEST_VARIANCE 4e-4f
 // Largest scale (px) of the robust weights.
 #define LARGEST_RESIDUAL 0.6f
-// Displacements from the source's own plane (px): largest that counts, and what an unchecked pixel counts as.
+// Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
-#define UNCHECKED_DISPLACEMENT 1.0f
 // Rounds, the last two over the whole radius, the others over a quarter and a half of it.
 #define REGRESSION_ROUNDS 4
 #define WHOLE_RADIUS_ROUND 2

@@ -4,6 +4,9 @@
 #define PI 3.14159265f
 #define UNIFORM_SAMPLING 0
 
+// Share of the range of inverse distance over which half of the preference for far planes builds up.
+#define SATURATED_SHARE 0.03f
+
 #define NEIGHBOUR_LEFT 1
 #define NEIGHBOUR_RIGHT 2
 #define NEIGHBOUR_UP 4
@@ -59,12 +62,26 @@ FN vec3 perturbed_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float sc
   return plane_through(ray, distance, normal_from_angles(theta, phi));
 }
 
-// The better of the held hypothesis (m, cost) and a candidate.
-FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m) {
+// What a plane at inverse distance w must do better by: decides where nothing else does, so that sky is far.
+// Saturates at a few per cent of the range, and so does not pull at planes nearer than that.
+FN float nearness_penalty(CONTEXT_ARGUMENT float w) {
+  vec4 range = PARAMETERS.range;
+  float nearness = max(w - range.z, 0.0f) / (SATURATED_SHARE * (range.w - range.z));
+  return PARAMETERS.support.w * nearness / (1.0f + nearness);
+}
+
+// The better of the held hypothesis (m, cost) and a candidate. `small`: difference of inverse distance up to which
+// the farther of the two is not preferred, which would pull at planes that are matched.
+FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m, float small) {
   bool same = m.x == held.x && m.y == held.y && m.z == held.z;
   if (same || !admissible(CONTEXT ray, m)) return held;
   float cost = patch_cost(CONTEXT pixel, m);
-  if (cost < held.w) return vec4(m, cost);
+  if (cost >= INVALID_COST) return held;
+  float w = dot(m, ray);
+  float w_held = held.x * ray.x + held.y * ray.y + held.z * ray.z;
+  float handicap = 0.0f;
+  if (abs(w - w_held) > small) handicap = nearness_penalty(CONTEXT w) - nearness_penalty(CONTEXT w_held);
+  if (cost + handicap < held.w) return vec4(m, cost);
   return held;
 }
 
@@ -111,7 +128,7 @@ FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   // One loop for all candidates: the cost function is then compiled once.
   int candidates = 4 + PARAMETERS.search.y;
   for (int i = 0; i < candidates; ++i) {
-    held = better_of(CONTEXT pixel, ray, held, candidate_plane(CONTEXT pixel, ray, held, i));
+    held = better_of(CONTEXT pixel, ray, held, candidate_plane(CONTEXT pixel, ray, held, i), 0.0f);
   }
   store_hypothesis(CONTEXT PASS.reference, pixel, held);
 }

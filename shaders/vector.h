@@ -57,6 +57,7 @@ FN double sqrt(double a) { return ::sqrt(a); }
 FN float sin(float a) { return ::sinf(a); }
 FN float cos(float a) { return ::cosf(a); }
 FN float exp(float a) { return ::expf(a); }
+FN float log(float a) { return ::logf(a); }
 FN float floor(float a) { return ::floorf(a); }
 FN float atan(float y, float x) { return ::atan2f(y, x); }
 FN double atan(double y, double x) { return ::atan2(y, x); }

@@ -69,15 +69,19 @@ void run_evaluate(EvaluateArguments a) {
   const std::vector<ws::RegionScores> scores =
       ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
   std::vector<ws::SparsificationPoint> curve;
+  std::vector<ws::ReliabilityBin> bins;
   if (!a.confidence.empty()) {
-    curve = ws::sparsification(prediction, ws::read_map(a.confidence), truth, rig.views[a.view],
+    const cv::Mat confidence = ws::read_map(a.confidence);
+    curve = ws::sparsification(prediction, confidence, truth, rig.views[a.view],
                                rig.views[a.source]);
+    bins = ws::reliability(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
   }
   if (a.as_json) {
     std::cout << "{\"regions\": " << ws::to_json(scores)
-              << ", \"sparsification\": " << ws::to_json(curve) << "}\n";
+              << ", \"sparsification\": " << ws::to_json(curve)
+              << ", \"reliability\": " << ws::to_json(bins) << "}\n";
   } else {
-    std::cout << ws::to_table(scores) << ws::to_table(curve);
+    std::cout << ws::to_table(scores) << ws::to_table(curve) << ws::to_table(bins);
   }
   if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
 }
@@ -91,7 +95,8 @@ void add_evaluate_command(CLI::App& app) {
       ->required();
   command->add_option("--normals", a->normals, "Normal map to score as well");
   command->add_option("--confidence", a->confidence,
-                      "Confidence map: prints the error of the most confident pixels");
+                      "Confidence map: prints the error of the most confident pixels, and how often pixels "
+                      "of each confidence are right");
   command->add_option("--set", a->set, "Folder with depthN.tiff, validN.png, occN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");

@@ -77,6 +77,10 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
   add("--regression-precision", regression_precision,
       "Precision that lets the regression do with a smaller neighbourhood, pixels");
+  add("--repair-radius", repair_radius,
+      "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
+  add("--far-preference", far_preference,
+      "How much better the nearest planes must match than the farthest, which keeps sky far");
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
   add("--step-normal", step_normal, "First perturbation of a unit normal");
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");
@@ -95,6 +99,12 @@ void MatchSettings::add_to(CLI::App& command) {
   add_check("--max-cost", max_cost, "Largest matching cost 1 - ZNCC");
   add_check("--min-parallax", min_parallax, "Smallest parallax over the distance range, pixels");
   add_check("--max-tilt", max_tilt, "Largest angle between normal and viewing ray, degrees");
+  add_check("--min-support", min_support,
+            "Share of the planes around that must support a pixel's own; fewer are a speckle");
+  add_check("--ambiguity-margin", ambiguity_margin,
+            "Reject where another place costs less by more than this; 0 = not checked");
+  add_check("--fill-radius", fill_radius,
+            "Fill rejected pixels from accepted ones up to this many pixels away; 0 = do not");
 }
 
 Options MatchSettings::options() const {
@@ -118,6 +128,8 @@ Options MatchSettings::options() const {
   take(options.regression_radius, regression_radius);
   take(options.regression_scale, regression_scale);
   take(options.regression_precision, regression_precision);
+  take(options.repair_radius, repair_radius);
+  take(options.far_preference, far_preference);
   take(options.step_pixels, step_pixels);
   take(options.step_normal, step_normal);
   take(options.source_planes, source_planes);
@@ -127,6 +139,9 @@ Options MatchSettings::options() const {
   take(options.max_cost, max_cost);
   take(options.min_parallax, min_parallax);
   take(options.max_tilt, max_tilt);
+  take(options.min_support, min_support);
+  take(options.ambiguity_margin, ambiguity_margin);
+  take(options.fill_radius, fill_radius);
   take(options.consistency_relative, consistency_relative);
   take(options.consistency_pixels, consistency_pixels);
   validate(options);

@@ -17,7 +17,9 @@ struct MatchSettings {
   std::optional<double> min_distance, max_distance;
   std::optional<int> window_radius, first_iterations, second_iterations, refinements, best_sources;
   std::optional<std::uint32_t> seed;
-  std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt;
+  std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt, min_support,
+      ambiguity_margin, far_preference;
+  std::optional<int> repair_radius, fill_radius;
   std::optional<double> consistency_relative, consistency_pixels;
   std::optional<int> levels, sweep_steps, regression_radius;
   std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,

@@ -39,7 +39,9 @@ class ViewWriter {
             {"width", view_.camera.width},
             {"height", view_.camera.height},
             {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
-            {"accepted", cv::countNonZero(accepted_) / std::max(usable, 1.0)},
+            {"accepted", cv::countNonZero(result_.reasons == 0) / std::max(usable, 1.0)},
+            {"filled",
+             cv::countNonZero(result_.reasons & ws::reason_filled) / std::max(usable, 1.0)},
             {"mean_cost", scores.mean_cost},
             {"cost_below_0.2", scores.low_cost},
             {"consistent_within_2_percent", scores.consistent_relative},
@@ -131,14 +133,17 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
   record["conventions"] = {
       {"distance", "metres along the unit viewing ray through the pixel centre; 0 = no value"},
       {"distance_png", "16 bit, " + Json(format.png_scale).dump() + " units per metre"},
-      {"distance_accepted", "distance, 0 where reasons is not 0"},
+      {"distance_accepted", "distance, 0 where reasons is not 0 and the pixel was not filled"},
       {"normals",
        "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
       {"cost", "1 - ZNCC in [0, 2]; 2 = no plane, 1 = no texture"},
-      {"confidence", "[0, 1], 0 where rejected"},
+      {"confidence",
+       "probability that the point is within 2 px of its true place in the other view; 0 = no plane "
+       "of its own"},
       {"reasons",
        "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
-       "32 unchecked, 64 low parallax, 128 tilt; 0 = accepted"},
+       "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle; 1024 = filled all the "
+       "same; 0 = accepted; 16 bit"},
       {"cloud", "world frame, metres, accepted pixels"},
       {"pixels", "integer coordinates are pixel centres"}};
   return record;

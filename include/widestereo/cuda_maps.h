@@ -33,7 +33,7 @@ struct CudaViewMaps {
   CudaMap<float> normals;         ///< x y z of each pixel next to each other, 12 bytes a pixel
   CudaMap<float> cost;            ///< 1 - ZNCC in [0, 2], 2 = no plane
   CudaMap<float> confidence;      ///< in [0, 1]
-  CudaMap<std::uint8_t> reasons;  ///< Reason bits, 0 = accepted
+  CudaMap<std::uint16_t> reasons;  ///< Reason bits, 0 = accepted
 };
 
 }  // namespace widestereo

@@ -81,6 +81,25 @@ std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const c
 std::string to_table(const std::vector<SparsificationPoint>& curve);
 std::string to_json(const std::vector<SparsificationPoint>& curve);
 
+/// How often pixels of about the same confidence are right: displaced by at most 2 px in the source.
+struct ReliabilityBin {
+  double low = 0, high = 1;  ///< confidence: low <= c < high
+  long pixels = 0;
+  double mean_confidence = 0;
+  double right = 0;  ///< share of the pixels
+};
+
+/// Bins from 0 to 1 over all pixels, occluded ones too, that have a prediction and whose true point
+/// projects into the source image.
+std::vector<ReliabilityBin> reliability(const cv::Mat& distance, const cv::Mat& confidence,
+                                        const GroundTruth& truth, const View& reference,
+                                        const View& source);
+
+/// The bins that have pixels as a fixed-width table (empty for none), each also with all above it,
+/// and all bins as JSON text.
+std::string to_table(const std::vector<ReliabilityBin>& bins);
+std::string to_json(const std::vector<ReliabilityBin>& bins);
+
 /// BGR picture of the relative error: green <= 0.5 %, yellow about 2 %, red >= 5 %, blue = no
 /// prediction, dimmed = occluded or outside the source view, black = no ground truth.
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth);

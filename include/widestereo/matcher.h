@@ -15,7 +15,7 @@ namespace widestereo {
 
 /// Why a pixel was rejected: bits of ViewResult::reasons (values of the kernels,
 /// shaders/check.glsl).
-enum Reason : std::uint8_t {
+enum Reason : std::uint16_t {
   reason_no_ray = 1,         ///< outside the lens, the model's domain or the mask
   reason_no_overlap = 2,     ///< no plane there is visible in any source view
   reason_no_texture = 4,     ///< the patch carries no information
@@ -24,6 +24,9 @@ enum Reason : std::uint8_t {
   reason_unchecked = 32,  ///< the point does not project to a pixel with a plane in the source view
   reason_low_parallax = 64,  ///< the distance is not observable here (near an epipole)
   reason_tilt = 128,         ///< the plane is seen at too grazing an angle
+  reason_ambiguous = 256,    ///< another place in the source matches better
+  reason_speckle = 512,      ///< hardly a plane around agrees
+  reason_filled = 1024,      ///< not a reason: the rejected pixel took the plane of accepted ones
 };
 
 /// Result for one reference view. All maps have the view's size.
@@ -38,8 +41,10 @@ struct ViewResult {
   /// pixel's point and where the best agreeing source view's own plane puts it; 1000 where that
   /// cannot be measured.
   cv::Mat differences;
-  cv::Mat confidence;  ///< CV_32FC1 in [0, 1]
-  cv::Mat reasons;     ///< CV_8UC1, Reason bits; 0 = accepted
+  /// CV_32FC1 in [0, 1]: probability that the pixel's point lies within 2 px of its true place in
+  /// the source view, rejected or not; 0 where there is no plane or it was filled.
+  cv::Mat confidence;
+  cv::Mat reasons;  ///< CV_16UC1, Reason bits; 0 = accepted
 };
 
 struct KernelTime {
@@ -56,7 +61,7 @@ struct StereoResult {
   std::size_t device_bytes = 0;  ///< memory taken on the device
 };
 
-/// `distance` with rejected pixels (reasons != 0) set to 0.
+/// `distance` with rejected pixels (reasons != 0) that were not filled set to 0.
 cv::Mat accepted_distance(const ViewResult& view);
 
 /// Matches images of one rig; made once, used for many frames of the same sizes.

@@ -113,6 +113,7 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"
+#include "fill.glsl"
 // clang-format on
 
 }  // namespace widestereo::kernel::cpu

@@ -75,7 +75,7 @@ __global__ void export_pixel(ViewMemory view, CudaViewMaps maps, int height) {
     *at(maps.confidence.data, maps.confidence.pitch, x, y) = checked.z;
   }
   if (maps.reasons.data != nullptr) {
-    *at(maps.reasons.data, maps.reasons.pitch, x, y) = static_cast<std::uint8_t>(checked.w);
+    *at(maps.reasons.data, maps.reasons.pitch, x, y) = static_cast<std::uint16_t>(checked.w);
   }
 }
 

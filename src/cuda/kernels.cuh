@@ -108,6 +108,7 @@ struct Algorithm {
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"
+#include "fill.glsl"
   // clang-format on
 
   /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
@@ -145,6 +146,8 @@ ENTRY_POINT(search, reference)
 ENTRY_POINT(measure, reference)
 ENTRY_POINT(regress, reference)
 ENTRY_POINT(adopt, reference)
+ENTRY_POINT(fill, reference)
+ENTRY_POINT(adopt_fill, reference)
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}

@@ -25,6 +25,7 @@ struct Sample {
   double theta = 0;  ///< degrees
   bool non_occluded = true;
   bool predicted = false;
+  bool in_source = false;               ///< the true point projects into the source image
   double error = 0;                     ///< metres
   double displacement = not_projected;  ///< pixels in the source
   double normal_angle = -1;             ///< degrees
@@ -92,8 +93,9 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       sample.error = std::abs(static_cast<double>(d) - sample.truth);
       Eigen::Vector2d predicted;
       Eigen::Vector2d expected;
-      const bool in_source = to_source(sample.truth * ray, expected);
-      if (in_source && project(source.camera, motion * (static_cast<double>(d) * ray), predicted)) {
+      sample.in_source = to_source(sample.truth * ray, expected);
+      if (sample.in_source &&
+          project(source.camera, motion * (static_cast<double>(d) * ray), predicted)) {
         sample.displacement = (predicted - expected).norm();
       }
       if (!normals.empty() && !truth.normals.empty()) {
@@ -104,6 +106,9 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   }
   return samples;
 }
+
+/// Within 2 px of its true place in the source; false where the predicted point does not project.
+bool is_right(const Sample& sample) { return sample.displacement <= 2; }
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -230,12 +235,36 @@ std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const c
   std::size_t next = 0;
   for (int tenth = 1; tenth <= 10 && !samples.empty(); ++tenth) {
     const std::size_t end = std::max<std::size_t>(1, samples.size() * tenth / 10);
-    for (; next < end; ++next) bad += !(samples[next].displacement <= 2);  // true for NaN
+    for (; next < end; ++next) bad += !is_right(samples[next]);
     curve.push_back({static_cast<double>(end) / static_cast<double>(samples.size()),
                      samples[end - 1].confidence,
                      static_cast<double>(bad) / static_cast<double>(end)});
   }
   return curve;
+}
+
+std::vector<ReliabilityBin> reliability(const cv::Mat& distance, const cv::Mat& confidence,
+                                        const GroundTruth& truth, const View& reference,
+                                        const View& source) {
+  constexpr std::array<double, 9> limits = {0, 0.2, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 1};
+  std::vector<ReliabilityBin> bins;
+  for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
+    bins.push_back({.low = limits[i], .high = limits[i + 1]});
+  }
+  for (const Sample& sample : collect(distance, {}, confidence, truth, reference, source)) {
+    if (!sample.predicted || !sample.in_source) continue;
+    const auto above = std::upper_bound(limits.begin() + 1, limits.end() - 1, sample.confidence);
+    ReliabilityBin& bin = bins[static_cast<std::size_t>(above - limits.begin() - 1)];
+    bin.pixels += 1;
+    bin.mean_confidence += sample.confidence;
+    bin.right += is_right(sample);
+  }
+  for (ReliabilityBin& bin : bins) {
+    if (bin.pixels == 0) continue;
+    bin.mean_confidence /= static_cast<double>(bin.pixels);
+    bin.right /= static_cast<double>(bin.pixels);
+  }
+  return bins;
 }
 
 }  // namespace widestereo

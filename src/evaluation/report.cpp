@@ -87,6 +87,40 @@ std::string to_json(const std::vector<SparsificationPoint>& curve) {
   return json.dump(2);
 }
 
+std::string to_table(const std::vector<ReliabilityBin>& bins) {
+  if (bins.empty()) return "";
+  double total = 0;
+  for (const ReliabilityBin& bin : bins) total += static_cast<double>(bin.pixels);
+  std::vector<std::string> lines;
+  double above = 0;
+  double right_above = 0;
+  for (auto bin = bins.rbegin(); bin != bins.rend(); ++bin) {
+    const auto pixels = static_cast<double>(bin->pixels);
+    above += pixels;
+    right_above += bin->right * pixels;
+    if (bin->pixels == 0) continue;
+    lines.push_back(formatted("%4.2f to %4.2f %9.1f%% %10.3f %8.1f%% | %8.1f%% %8.1f%%\n", bin->low,
+                              bin->high, 100 * pixels / total, bin->mean_confidence,
+                              100 * bin->right, 100 * above / total, 100 * right_above / above));
+  }
+  std::string table = formatted("%-12s %10s %10s %9s | %9s %9s\n", "confidence", "pixels", "mean",
+                                "right", "and above", "right");
+  for (auto line = lines.rbegin(); line != lines.rend(); ++line) table += *line;
+  return table;
+}
+
+std::string to_json(const std::vector<ReliabilityBin>& bins) {
+  nlohmann::ordered_json json = nlohmann::json::array();
+  for (const ReliabilityBin& bin : bins) {
+    json.push_back({{"low", bin.low},
+                    {"high", bin.high},
+                    {"pixels", bin.pixels},
+                    {"mean_confidence", bin.mean_confidence},
+                    {"right", bin.right}});
+  }
+  return json.dump(2);
+}
+
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
   cv::Mat picture = cv::Mat::zeros(distance.size(), CV_8UC3);
   for (int y = 0; y < distance.rows; ++y) {

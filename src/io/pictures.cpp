@@ -20,14 +20,17 @@ struct ReasonStyle {
   const char* name;
   cv::Vec3b colour;
 };
-const std::array<ReasonStyle, 8> reason_styles = {{{"no ray", {48, 48, 48}},
+const std::array<ReasonStyle, 11> reason_styles = {{{"no ray", {48, 48, 48}},
                                                    {"no overlap", {160, 90, 40}},
                                                    {"no texture", {200, 200, 60}},
                                                    {"high cost", {60, 60, 220}},
                                                    {"inconsistent", {40, 150, 250}},
                                                    {"unchecked", {190, 80, 190}},
                                                    {"low parallax", {120, 220, 120}},
-                                                   {"tilt", {200, 150, 250}}}};
+                                                   {"tilt", {200, 150, 250}},
+                                                   {"ambiguous", {60, 200, 250}},
+                                                   {"speckle", {230, 80, 40}},
+                                                   {"filled", {150, 150, 150}}}};
 
 /// `share` in [0, 1] through a colour map; pixels where `valid` is 0 get the colour of no value.
 cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {
@@ -147,16 +150,11 @@ cv::Mat scalar_picture(const cv::Mat& map, double low, double high) {
 
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
   cv::Mat picture = as_bgr8(image);
-  for (int y = 0; y < reasons.rows; ++y) {
-    for (int x = 0; x < reasons.cols; ++x) {
-      const int bits = reasons.at<uchar>(y, x);
-      for (std::size_t bit = 0; bit < reason_styles.size(); ++bit) {
-        if ((bits >> bit & 1) == 0) continue;
-        picture.at<cv::Vec3b>(y, x) = reason_styles[bit].colour;
-        break;
-      }
-    }
+  // The lowest bit that is set shows, but what was filled shows as that.
+  for (std::size_t bit = reason_styles.size() - 1; bit-- > 0;) {
+    picture.setTo(reason_styles[bit].colour, (reasons & (1 << bit)) != 0);
   }
+  picture.setTo(reason_styles.back().colour, (reasons & (1 << (reason_styles.size() - 1))) != 0);
   return picture;
 }
 
@@ -178,9 +176,9 @@ cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high) {
 cv::Mat with_reason_legend(const cv::Mat& picture) {
   const double scale = text_scale(picture);
   const int line = static_cast<int>(30 * scale);
-  cv::Mat result = with_strip(picture, 3 * line);
+  cv::Mat result = with_strip(picture, 17 * line / 4);
   const int column = picture.cols / 4;
-  for (int i = 0; i < 8; ++i) {
+  for (int i = 0; i < static_cast<int>(reason_styles.size()); ++i) {
     const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
     const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
     cv::rectangle(result, box, cv::Scalar(reason_styles[i].colour), cv::FILLED);

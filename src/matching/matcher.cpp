@@ -64,7 +64,7 @@ void unpack_checks(const cv::Mat& checks, ViewResult& result) {
   cv::split(checks, channels);
   cv::merge(std::vector<cv::Mat>{channels[0], channels[1]}, result.differences);
   result.confidence = channels[2];
-  channels[3].convertTo(result.reasons, CV_8U);
+  channels[3].convertTo(result.reasons, CV_16U);
 }
 
 }  // namespace
@@ -114,7 +114,8 @@ class Matcher::Implementation {
 
 cv::Mat accepted_distance(const ViewResult& view) {
   cv::Mat distance = view.distance.clone();
-  distance.setTo(0, view.reasons != 0);
+  const cv::Mat filled = (view.reasons & reason_filled) != 0;
+  distance.setTo(0, (view.reasons != 0) & ~filled);
   return distance;
 }
 

@@ -40,9 +40,11 @@ Options Options::preset_named(const std::string& name) {
   options.window_radius = 4;
   options.weight_scale = 12;
   options.min_texture = 0;
+  options.max_cost = 0.8;
+  options.far_preference = 0.08;
   if (name == "fast") {
     options.pattern = PatchPattern::checkerboard;
-    options.sweep_steps = 30;
+    options.sweep_steps = 16;
     options.level_iterations = {2, 2, 2};
     options.level_regressions = {1, 1, 2};
     options.source_planes = false;
@@ -52,6 +54,7 @@ Options Options::preset_named(const std::string& name) {
     options.sweep_steps = 128;
     options.level_iterations = {4, 3, 2};
     options.level_regressions = {1, 2, 2};
+    options.ambiguity_margin = 0.2;
     return options;
   }
   std::string known;
@@ -98,6 +101,11 @@ void validate(const Options& o) {
   require_between(o.max_cost, 0, 2, "max cost");
   require_between(o.min_parallax, 0, 10000, "min parallax");
   require_between(o.max_tilt, 0, 90, "max tilt");
+  require_between(o.min_support, 0, 1, "min support");
+  require_between(o.ambiguity_margin, 0, 2, "ambiguity margin");
+  require_between(o.far_preference, 0, 2, "far preference");
+  require_between(o.repair_radius, 0, 10000, "repair radius");
+  require_between(o.fill_radius, 0, 10000, "fill radius");
 }
 
 std::string to_json(const Options& o) {
@@ -116,6 +124,8 @@ std::string to_json(const Options& o) {
                                        {"regression_radius", o.regression_radius},
                                        {"regression_scale", o.regression_scale},
                                        {"regression_precision", o.regression_precision},
+                                       {"repair_radius", o.repair_radius},
+                                       {"far_preference", o.far_preference},
                                        {"step_pixels", o.step_pixels},
                                        {"step_normal", o.step_normal},
                                        {"source_planes", o.source_planes},
@@ -132,7 +142,10 @@ std::string to_json(const Options& o) {
                                        {"consistency_pixels", o.consistency_pixels},
                                        {"max_cost", o.max_cost},
                                        {"min_parallax", o.min_parallax},
-                                       {"max_tilt", o.max_tilt}};
+                                       {"max_tilt", o.max_tilt},
+                                       {"min_support", o.min_support},
+                                       {"ambiguity_margin", o.ambiguity_margin},
+                                       {"fill_radius", o.fill_radius}};
   return json.dump(2);
 }
 

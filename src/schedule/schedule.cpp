@@ -9,6 +9,7 @@
 
 #include "geometry/camera_parameters.h"
 #include "widestereo/error.h"
+#include "widestereo/matcher.h"
 
 namespace widestereo {
 namespace {
@@ -40,13 +41,14 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, const Opt
   p.range = {single(options.min_distance), single(options.max_distance),
              single(1 / options.max_distance), single(1 / options.min_distance)};
   p.patch_limits = {single(std::pow(options.min_texture / 255, 2)), single(options.min_visible),
-                    single(std::cos(options.max_tilt * degree)), 0};
+                    single(std::cos(options.max_tilt * degree)), single(options.min_support)};
   p.check_limits = {single(options.consistency_relative), single(options.consistency_pixels),
                     single(options.max_cost), single(options.min_parallax)};
   const auto inverse_scale = [](double grey_levels) {
     return grey_levels > 0 ? static_cast<float>(255 / grey_levels) : 0.0f;
   };
-  p.support = {inverse_scale(options.weight_scale), inverse_scale(options.regression_scale), 0, 0};
+  p.support = {inverse_scale(options.weight_scale), inverse_scale(options.regression_scale),
+               single(options.ambiguity_margin), single(options.far_preference)};
   const int views = static_cast<int>(all.size());
   p.search = {static_cast<int>(options.sampling), options.refinements, options.best_sources, views};
   for (int i = 0; i < views; ++i) {
@@ -125,7 +127,8 @@ class Builder {
     } else {
       build_random();
     }
-    for (int view = 0; view < views_of_rig_; ++view) add(Kernel::check, pass_of(view), view, 0);
+    check_and_fill(options_.ambiguity_margin > 0 ? other_places : 0, options_.fill_radius,
+                   reason_no_ray);
     return std::move(schedule_);
   }
 
@@ -158,6 +161,9 @@ class Builder {
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) regress(view, level, options_.regression_precision);
+        if (level == 0 && options_.repair_radius > 0) {
+          check_and_fill(0, options_.repair_radius, reason_no_ray | reason_no_overlap);
+        }
       }
     }
     if (options_.level_regressions.back() > 0) {
@@ -276,6 +282,24 @@ class Builder {
     add(Kernel::adopt, pass, view, 1);
   }
 
+  /// Checks every view, then fills: filled planes must not count as a source's own.
+  void check_and_fill(int places, int fill_radius, unsigned reasons_not_to_fill) {
+    for (const int view : views_of(0)) {
+      kernel::PassParameters pass = pass_of(view);
+      pass.steps = places;
+      add(Kernel::check, pass, view, places);
+    }
+    if (fill_radius == 0) return;
+    for (const int view : views_of(0)) {
+      kernel::PassParameters pass = pass_of(view);
+      pass.steps = fill_radius;
+      pass.candidates = reasons_not_to_fill;
+      add(Kernel::fill, pass, view, 0);
+      add(Kernel::adopt_fill, pass, view, 1);
+    }
+  }
+
+  static constexpr int other_places = 6;
   static constexpr double normal_only = 0;
   const Options& options_;
   int levels_ = 1;
@@ -290,7 +314,8 @@ const char* to_string(Kernel kernel) {
   static constexpr std::array<const char*, kernel_count> names = {
       "initialise",      "iterate",         "iterate_raster", "transfer_clear", "transfer_nearest",
       "transfer_winner", "transfer_gather", "check",          "downsample",     "sweep",
-      "upsample",        "search",          "measure",        "regress",        "adopt"};
+      "upsample",        "search",          "measure",        "regress",        "adopt",
+      "fill",            "adopt_fill"};
   return names[static_cast<std::size_t>(kernel)];
 }
 

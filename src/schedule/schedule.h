@@ -28,8 +28,10 @@ enum class Kernel {
   measure,           ///< how precisely each pixel is matched (kept where the checks go)
   regress,           ///< precision-weighted plane of each pixel's neighbourhood
   adopt,             ///< takes those planes over
+  fill,              ///< planes of accepted pixels for the rejected ones around them
+  adopt_fill,        ///< takes those planes over and marks the pixels
 };
-inline constexpr int kernel_count = 15;
+inline constexpr int kernel_count = 17;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).

@@ -171,10 +171,10 @@ struct DeviceMaps {
         normals(size, CV_32FC3),
         cost(size, CV_32FC1),
         confidence(size, CV_32FC1),
-        reasons(size, CV_8UC1) {}
+        reasons(size, CV_16UC1) {}
   CudaViewMaps maps() const {
     return {distance.map<float>(), normals.map<float>(), cost.map<float>(), confidence.map<float>(),
-            reasons.map<std::uint8_t>()};
+            reasons.map<std::uint16_t>()};
   }
   void expect_equal(const ViewResult& expected) const {
     EXPECT_TRUE(same_bits(distance.download(), expected.distance));

@@ -145,6 +145,32 @@ TEST(Evaluation, SparsificationFallsWhenConfidenceIsRight) {
   EXPECT_NEAR(curve[9].kept, 1, 1e-12);
 }
 
+TEST(Evaluation, ReliabilityCountsWhatIsRightInEachBin) {
+  const RenderedPair pair = render_demo(96);
+  const GroundTruth& truth = pair.views[0].truth;
+  cv::Mat distance = truth.distance.clone();
+  cv::Mat confidence(distance.size(), CV_32FC1, cv::Scalar(1));
+  distance.rowRange(0, 48) *= 0.1;  // wrong
+  confidence.rowRange(0, 48).setTo(0.1);
+  distance.row(0).setTo(0);  // not predicted: not counted
+  const std::vector<ReliabilityBin> bins =
+      reliability(distance, confidence, truth, pair.rig.views[0], pair.rig.views[1]);
+  EXPECT_NEAR(bins.front().mean_confidence, 0.1, 1e-6);
+  EXPECT_LT(bins.front().right, 0.1);
+  EXPECT_NEAR(bins.back().mean_confidence, 1, 1e-6);
+  EXPECT_EQ(bins.back().right, 1);
+  long pixels = 0;
+  for (const ReliabilityBin& bin : bins) {
+    if (bin.pixels == 0) continue;
+    EXPECT_TRUE(&bin == &bins.front() || &bin == &bins.back());
+    pixels += bin.pixels;
+  }
+  EXPECT_GT(bins.front().pixels, 1000);
+  EXPECT_LE(pixels, cv::countNonZero(distance));
+  EXPECT_NE(to_table(bins).find("0.98 to 1.00"), std::string::npos);
+  EXPECT_EQ(to_table(bins).find("0.50 to 0.70"), std::string::npos) << "empty bins are left out";
+}
+
 TEST(Evaluation, ErrorPictureColours) {
   GroundTruth truth;
   truth.distance = (cv::Mat_<float>(1, 4) << 2, 2, 2, 0);

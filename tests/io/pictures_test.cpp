@@ -47,12 +47,16 @@ TEST(Pictures, NormalsHaveDocumentedColours) {
 }
 
 TEST(Pictures, ReasonsCoverTheImage) {
-  cv::Mat reasons = cv::Mat::zeros(2, 2, CV_8UC1);
-  reasons.at<uchar>(0, 1) = reason_inconsistent | reason_tilt;
+  cv::Mat reasons = cv::Mat::zeros(2, 2, CV_16UC1);
+  reasons.at<ushort>(0, 1) = reason_inconsistent | reason_tilt;
+  reasons.at<ushort>(1, 0) = reason_inconsistent | reason_filled;
+  reasons.at<ushort>(1, 1) = reason_inconsistent;
   const cv::Mat image(2, 2, CV_8UC1, cv::Scalar(77));
   const cv::Mat picture = reason_picture(reasons, image);
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(77, 77, 77));
   EXPECT_NE(picture.at<cv::Vec3b>(0, 1), cv::Vec3b(77, 77, 77));
+  EXPECT_EQ(picture.at<cv::Vec3b>(0, 1), picture.at<cv::Vec3b>(1, 1)) << "the lowest bit shows";
+  EXPECT_NE(picture.at<cv::Vec3b>(1, 0), picture.at<cv::Vec3b>(1, 1)) << "filled shows as filled";
 }
 
 TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Filling of rejected pixels from the nearest accepted ones in eight directions.
+
+// Stores as prior (m, 1) the plane that the pixel would take over, zero where there is none: the lower quartile
+// of inverse distance, since occluded pixels belong to the farther surface, weighted by likeness of intensity.
+FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  float intensity = intensity_at(CONTEXT PASS.reference, pixel);
+  vec3 planes[8];
+  float weights[8];
+  int count = 0;
+  float total = 0.0f;
+  uint reasons = uint(check_at(CONTEXT PASS.reference, pixel).w);
+  bool wanted = reasons != 0u && (reasons & PASS.candidates) == 0u;
+  for (int i = 0; i < 9 && wanted; ++i) {
+    int dx = i % 3 - 1;
+    int dy = i / 3 - 1;
+    if (dx == 0 && dy == 0) continue;
+    int reach = dx == 0 || dy == 0 ? PASS.steps : PASS.steps * 7 / 10;
+    for (int k = 1; k <= reach; ++k) {
+      ivec2 q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
+      if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) break;
+      if (check_at(CONTEXT PASS.reference, q).w != 0.0f) continue;
+      vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
+      vec3 m = vec3(held.x, held.y, held.z);
+      if (!admissible(CONTEXT ray, m)) break;
+      // A floor decides among neighbours that are all unlike the pixel.
+      float unlike = abs(intensity_at(CONTEXT PASS.reference, q) - intensity);
+      float weight = exp(-unlike * PARAMETERS.support.y) + 1e-12f;
+      int place = count;
+      while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
+        planes[place] = planes[place - 1];
+        weights[place] = weights[place - 1];
+        --place;
+      }
+      planes[place] = m;
+      weights[place] = weight;
+      total += weight;
+      ++count;
+      break;
+    }
+  }
+  vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
+  float sum = 0.0f;
+  for (int i = 0; i < count && prior.w == 0.0f; ++i) {
+    sum += weights[i];
+    if (sum >= 0.25f * total) prior = vec4(planes[i], 1.0f);
+  }
+  store_prior(CONTEXT PASS.reference, pixel, prior);
+}
+
+// Takes the plane over, with the cost of no information where the source does not see it, and marks the pixel.
+FN void adopt_fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
+  if (prior.w == 0.0f) return;
+  vec3 m = vec3(prior.x, prior.y, prior.z);
+  store_hypothesis(CONTEXT PASS.reference, pixel,
+                   vec4(m, min(patch_cost(CONTEXT pixel, m), NO_INFORMATION_COST)));
+  vec4 checked = check_at(CONTEXT PASS.reference, pixel);
+  store_check(CONTEXT PASS.reference, pixel,
+              vec4(checked.x, checked.y, 0.0f, checked.w + float(REASON_FILLED)));
+}
