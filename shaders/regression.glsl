@@ -14,6 +14,8 @@
 // Rounds, the last two over the whole radius, the others over a quarter and a half of it.
 #define REGRESSION_ROUNDS 4
 #define WHOLE_RADIUS_ROUND 2
+// Bit of PASS.candidates.
+#define REGRESS_NORMALS 1u
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
@@ -118,7 +120,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float fall_off = 2.0f / float(radius * radius);
   int step = max(radius / 4, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
-  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, REGRESSION_SLOT + round);
+  vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;
   int first_y = int(u.y * float(step)) - step / 2 - radius + radius % step;
   float s = 0.0f;
@@ -185,8 +187,8 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
 }
 
 // Stores the plane of the smallest neighbourhood that determines it to PASS.step_pixels (m, 1) as the pixel's
-// prior, zero where there is none. Without PASS.step_pixels the whole neighbourhood gives the normal, and the
-// pixel keeps its distance.
+// prior, zero where there is none. With REGRESS_NORMALS the whole neighbourhood gives the normal; without
+// PASS.step_pixels it gives nothing else, and the pixel keeps its distance.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -203,18 +205,22 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.slope_x = dot(m, east) / TANGENT_SCALE;
     plane.slope_y = dot(m, south) / TANGENT_SCALE;
     vec4 own = check_at(CONTEXT PASS.reference, pixel);
-    bool normal_only = PASS.step_pixels == 0.0f;
+    bool normals = (PASS.candidates & REGRESS_NORMALS) != 0u;
+    bool has_distance = PASS.step_pixels == 0.0f;
     bool found = false;
     float w = plane.offset;
-    for (int round = normal_only ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
+    for (int round = has_distance ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
+      if (has_distance && round < WHOLE_RADIUS_ROUND) continue;
       LocalPlane fitted;
       float certainty;
       if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, plane, fitted, certainty)) continue;
       plane = fitted;
       found = true;
-      if (certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) break;
+      if (!has_distance) w = plane.offset;
+      if (certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) has_distance = true;
+      if (has_distance && !normals) break;
     }
-    if (normal_only) plane.offset = w;
+    plane.offset = w;
     vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
                      (TANGENT_SCALE * plane.slope_y) * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);

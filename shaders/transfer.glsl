@@ -55,6 +55,20 @@ FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
   }
 }
 
+// The plane that won the pixel, in the reference frame; zero where none did or the pixel may not hold it.
+FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  vec3 none = vec3(0.0f, 0.0f, 0.0f);
+  uint index = transfer_winner_at(CONTEXT pixel);
+  if (index == 0xffffffffu) return none;
+  int width = PARAMETERS.cameras[PASS.other].size.x;
+  ivec2 p = ivec2(int(index) % width, int(index) / width);
+  vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
+  ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
+  vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
+  if (admissible(CONTEXT ray, moved)) return moved;
+  return none;
+}
+
 FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   if (usable_ray.w == 0.0f) {
@@ -62,15 +76,49 @@ FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     return;
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec3 m = random_plane(CONTEXT pixel, ray, 0);
-  uint index = transfer_winner_at(CONTEXT pixel);
-  if (index != 0xffffffffu) {
-    int width = PARAMETERS.cameras[PASS.other].size.x;
-    ivec2 p = ivec2(int(index) % width, int(index) / width);
-    vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
-    ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
-    vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
-    if (admissible(CONTEXT ray, moved)) m = moved;
+  vec3 m = transferred_plane(CONTEXT pixel, ray);
+  if (dot(m, ray) == 0.0f) m = random_plane(CONTEXT pixel, ray, 0);
+  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+}
+
+// The same between two frames of one view, PASS.other being the reference: the moved planes go where the priors
+// are, since other pixels still read the planes that they come from. (m, 1), zero where there is none.
+FN void transfer_keep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec3 m = vec3(0.0f, 0.0f, 0.0f);
+  if (usable_ray.w != 0.0f) {
+    m = transferred_plane(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z));
   }
+  bool found = m.x != 0.0f || m.y != 0.0f || m.z != 0.0f;
+  store_prior(CONTEXT PASS.reference, pixel, vec4(m, found ? 1.0f : 0.0f));
+}
+
+// The moved plane of the nearest pixel, about, that has one which this pixel may hold: surfaces continue into what
+// comes into view. A random plane where there is none.
+FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  for (int radius = 1; radius <= 32; radius *= 2) {
+    for (int i = 0; i < 8; ++i) {
+      int side = i < 4 ? i : i + 1;  // without the middle of 3x3
+      ivec2 q = ivec2(pixel.x + radius * (side % 3 - 1), pixel.y + radius * (side / 3 - 1));
+      if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
+      vec4 prior = prior_at(CONTEXT PASS.reference, q);
+      vec3 m = vec3(prior.x, prior.y, prior.z);
+      if (prior.w != 0.0f && admissible(CONTEXT ray, m)) return m;
+    }
+  }
+  return random_plane(CONTEXT pixel, ray, 0);
+}
+
+// Starts a pixel from the plane that has moved there.
+FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (!is_usable(CONTEXT pixel, usable_ray)) {
+    store_no_plane(CONTEXT pixel);
+    return;
+  }
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
+  vec3 m = vec3(prior.x, prior.y, prior.z);
+  if (prior.w == 0.0f) m = moved_plane_nearby(CONTEXT pixel, ray);
   store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
 }

@@ -19,9 +19,9 @@ struct MatchSettings {
   std::optional<std::uint32_t> seed;
   std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt;
   std::optional<double> consistency_relative, consistency_pixels;
-  std::optional<int> levels, sweep_steps, regression_radius;
+  std::optional<int> levels, sweep_steps, regression_radius, warm_iterations, warm_regressions;
   std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,
-      step_normal;
+      step_normal, warm_precision;
   std::optional<bool> source_planes;
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;

@@ -12,7 +12,8 @@ KernelTable generic_kernels() {
       KERNEL_ENTRY(check, C),           KERNEL_ENTRY(downsample, C),
       KERNEL_ENTRY(sweep, C),           KERNEL_ENTRY(upsample, C),
       KERNEL_ENTRY(search, C),          KERNEL_ENTRY(measure, C),
-      KERNEL_ENTRY(regress, C),         KERNEL_ENTRY(adopt, C)};
+      KERNEL_ENTRY(regress, C),         KERNEL_ENTRY(adopt, C),
+      KERNEL_ENTRY(transfer_keep, C),   KERNEL_ENTRY(renew, C)};
   return table_of(entries);
 }
 
