@@ -60,7 +60,8 @@ Images images_in(const fs::path& folder) {
       }
     }
   }
-  if (error) throw Error("Cannot read the folder " + folder.string() + ": " + error.message() + ".");
+  if (error)
+    throw Error("Cannot read the folder " + folder.string() + ": " + error.message() + ".");
   if (images.empty()) {
     throw Error("There are no images in " + folder.string() + "; check the path.");
   }

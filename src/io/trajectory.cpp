@@ -79,17 +79,16 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
     const auto apart = [seconds](const StampedPose& pose) {
       return std::abs(pose.seconds - seconds);
     };
-    auto nearest = std::lower_bound(
-        trajectory.begin(), trajectory.end(), seconds,
-        [](const StampedPose& pose, double time) { return pose.seconds < time; });
+    auto nearest =
+        std::lower_bound(trajectory.begin(), trajectory.end(), seconds,
+                         [](const StampedPose& pose, double time) { return pose.seconds < time; });
     if (nearest == trajectory.end() ||
         (nearest != trajectory.begin() && apart(*(nearest - 1)) < apart(*nearest))) {
       --nearest;
     }
     if (!(apart(*nearest) <= tolerance)) {
-      throw Error(name + " has no pose within " + std::to_string(tolerance) +
-                  " s of the frame " + frame.name + " (the nearest is " +
-                  std::to_string(apart(*nearest)) +
+      throw Error(name + " has no pose within " + std::to_string(tolerance) + " s of the frame " +
+                  frame.name + " (the nearest is " + std::to_string(apart(*nearest)) +
                   " s away); check the clocks, choose frames or raise the tolerance.");
     }
     poses.push_back(nearest->world_from_rig);
