@@ -250,7 +250,8 @@ class SequenceRun {
     ws::WarmStart start;
     start.frame = static_cast<int>(index);
     if (!previous_.on_device) {
-      for (const ws::ViewResult& view : previous_.views) start.hypotheses.push_back(view.hypotheses);
+      for (const ws::ViewResult& view : previous_.views)
+        start.hypotheses.push_back(view.hypotheses);
     }
     if (arguments_.no_motion) {
       frame.motion = "none";
@@ -262,9 +263,9 @@ class SequenceRun {
       start.now_from_previous =
           ws::estimate_motion(rig_, previous_.images, previous_.views, images);
       frame.motion = start.now_from_previous ? "estimated" : "not found";
-      frame.motion_milliseconds = std::chrono::duration<double, std::milli>(
-                                      std::chrono::steady_clock::now() - begin)
-                                      .count();
+      frame.motion_milliseconds =
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+              .count();
     }
     return start;
   }
@@ -289,7 +290,8 @@ class SequenceRun {
     note_cold(record);
     folder_.add(source.name, result.views, [&](const fs::path& folder) {
       FolderContents contents{.rig = rig_, .images = images, .run = frame.run};
-      for (const fs::path& image : source.images) contents.origin["images"].push_back(image.string());
+      for (const fs::path& image : source.images)
+        contents.origin["images"].push_back(image.string());
       contents.origin["calibration"] = arguments_.rig.calibration;
       contents.origin["frame"] = record;
       write_result_folder(folder, contents, arguments_.format);
@@ -297,10 +299,10 @@ class SequenceRun {
     });
     if (arguments_.as_json || bar_.visible()) return;
     std::printf("%s: %s%s%s, %.2f s, %.1f %% accepted, mean cost %.3f (%zu of %zu)\n",
-                source.name.c_str(), frame.start.c_str(),
-                frame.motion.empty() ? "" : ", motion ", frame.motion.c_str(),
-                (result.milliseconds + frame.motion_milliseconds) / 1000, 100 * quality.accepted,
-                quality.mean_cost, folder_.frames().size(), selection_.frames.size());
+                source.name.c_str(), frame.start.c_str(), frame.motion.empty() ? "" : ", motion ",
+                frame.motion.c_str(), (result.milliseconds + frame.motion_milliseconds) / 1000,
+                100 * quality.accepted, quality.mean_cost, folder_.frames().size(),
+                selection_.frames.size());
     std::fflush(stdout);
   }
 
@@ -324,7 +326,8 @@ void summarise(const Json& frames, bool warm) {
   int count = 0;
   for (const Json& frame : frames) {
     if ((frame["start"] == "warm") != warm) continue;
-    milliseconds += frame["milliseconds"].get<double>() + frame["motion_milliseconds"].get<double>();
+    milliseconds +=
+        frame["milliseconds"].get<double>() + frame["motion_milliseconds"].get<double>();
     samples += frame["patch_samples"].get<double>();
     ++count;
   }
@@ -354,9 +357,10 @@ void add_sequence_command(CLI::App& app) {
       "Match many frames, each started from the planes of the one before; run it again to resume");
   auto a = std::make_shared<SequenceArguments>();
   command
-      ->add_option("dataset", a->dataset,
-                   "Folder with cam0/, cam1/, ... (frames have equal file names), or in EuRoC or TUM "
-                   "VI layout (mav0/camN/data, data.csv)")
+      ->add_option(
+          "dataset", a->dataset,
+          "Folder with cam0/, cam1/, ... (frames have equal file names), or in EuRoC or TUM "
+          "VI layout (mav0/camN/data, data.csv)")
       ->required();
   a->rig.add_to(*command);
   command
@@ -376,8 +380,7 @@ void add_sequence_command(CLI::App& app) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(frames);
-  command
-      ->add_flag("--skip-incomplete", a->skip_incomplete, "Leave out frames that a camera lacks")
+  command->add_flag("--skip-incomplete", a->skip_incomplete, "Leave out frames that a camera lacks")
       ->group(frames);
   const std::string start = "Warm start";
   command

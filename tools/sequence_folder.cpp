@@ -16,7 +16,9 @@ namespace {
 constexpr const char* record_name = "sequence.json";
 constexpr const char* unfinished = ".unfinished";
 
-std::string of_view(const std::string& what, std::size_t view) { return what + std::to_string(view); }
+std::string of_view(const std::string& what, std::size_t view) {
+  return what + std::to_string(view);
+}
 
 /// The first setting that differs, as "NAME is A there and B now"; empty if none does.
 std::string first_difference(const Json& there, const Json& now) {
