@@ -79,7 +79,7 @@ Images images_listed_in(const fs::path& list) {
     const std::string time = line.substr(0, comma);
     const std::size_t start =
         comma == std::string::npos ? comma : line.find_first_not_of(' ', comma + 1);
-    if (!is_number(time) || time.size() > 18 || start == std::string::npos) {
+    if (!is_number(time) || time.size() > 19 || start == std::string::npos) {
       throw Error(list.string() + " line " + std::to_string(number) +
                   " is no \"nanoseconds,filename\".");
     }
