@@ -2,8 +2,13 @@
 // Starts a view from another view's planes: every plane is warped forward, the nearest one wins its pixel.
 // Integer atomics on inverse distances and pixel indices keep the outcome independent of the order.
 
-// Where pixel p of view PASS.other lands in the reference view: top left of its four pixels and its inverse
-// distance there. False where it has no plane or lands outside the model's domain.
+// Pixels along each side of what a plane is warped onto: the four around it, so that the planes of another view,
+// which sees everything at another size, leave no holes. Between two frames of one view the nearest one is enough
+// and does not fatten what is near, frame after frame; renewing fills the holes.
+FN int splat_side(CONTEXT_ARGUMENT_ONLY) { return PASS.other == PASS.reference ? 1 : 2; }
+
+// Where pixel p of view PASS.other lands in the reference view: top left of its pixels and its inverse distance
+// there. False where it has no plane or lands outside the model's domain.
 FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inverse_distance) {
   corner = ivec2(0, 0);
   inverse_distance = 0.0f;
@@ -23,7 +28,8 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   }
   float w = dot(m, unit_ray);
   inverse_distance = w / length(direction_in_source(pair, unit_ray, w));
-  corner = ivec2(int(floor(position.x)), int(floor(position.y)));
+  float offset = splat_side(CONTEXT_ONLY) == 1 ? 0.5f : 0.0f;
+  corner = ivec2(int(floor(position.x + offset)), int(floor(position.y + offset)));
   return true;
 }
 
@@ -33,7 +39,8 @@ FN void transfer_nearest_pixel(CONTEXT_ARGUMENT ivec2 p) {
   ivec2 corner;
   float inverse_distance;
   if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
-  for (int i = 0; i < 4; ++i) {
+  int side = splat_side(CONTEXT_ONLY);
+  for (int i = 0; i < side * side; ++i) {
     ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
     if (in_image(PARAMETERS.cameras[PASS.reference].size, q)) {
       transfer_nearest_raise(CONTEXT q, float_as_uint(inverse_distance));
@@ -46,7 +53,8 @@ FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
   float inverse_distance;
   if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
   uint index = uint(p.y * PARAMETERS.cameras[PASS.other].size.x + p.x);
-  for (int i = 0; i < 4; ++i) {
+  int side = splat_side(CONTEXT_ONLY);
+  for (int i = 0; i < side * side; ++i) {
     ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
     if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
     // Tolerant, because another kernel may have rounded the same inverse distance differently.

@@ -82,7 +82,7 @@ std::vector<View> pyramid(const Rig& rig, int levels) {
 }
 
 // Candidate kinds of shaders/adaptive_search.glsl.
-constexpr unsigned near_strips = 0xf;
+constexpr std::array<unsigned, 2> near_strips = {1 | 4, 2 | 8};  // up and left, down and right
 constexpr unsigned strips = 0xff;
 constexpr unsigned inverse_distance = 1u << 8;
 constexpr unsigned both = 1u << 10;
@@ -170,7 +170,8 @@ class Builder {
       const int place = levels_ - 1 - level;
       for (int i = 0; i < options_.level_iterations[place]; ++i) {
         const bool first = i == 0 && level == levels_ - 1;
-        for (const int view : views_of(level)) search(view, i, cold_candidates(first));
+        const unsigned candidates = cold_candidates(first);
+        for (const int view : views_of(level)) search(view, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) {
@@ -246,11 +247,15 @@ class Builder {
     add(Kernel::renew, pass, view, 1);
   }
 
-  /// Only what corrects planes that are nearly right: the near strips carry surfaces into what has
-  /// come into view, perturbations follow what moved; the regression then averages.
+  /// Only what corrects planes that are nearly right: the near strips, half of them for each colour,
+  /// carry surfaces into what has come into view, perturbations follow what moved; the regression
+  /// then averages.
   void search_warm() {
+    constexpr unsigned perturbations = inverse_distance | both;
     for (int i = 0; i < options_.warm_iterations; ++i) {
-      for (const int view : views_of(0)) search(view, i, near_strips | inverse_distance | both);
+      for (const int view : views_of(0)) {
+        search(view, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
+      }
     }
     for (int i = 1; i <= options_.warm_regressions; ++i) {
       const bool last = i == options_.warm_regressions;
@@ -295,16 +300,17 @@ class Builder {
     return candidates;
   }
 
-  void search(int view, int iteration, unsigned candidates) {
+  /// `candidates`: of each colour.
+  void search(int view, int iteration, const std::array<unsigned, 2>& candidates) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = iteration + 1;
-    pass.candidates = candidates;
     const double share = std::pow(0.5, iteration);
     pass.step_pixels = static_cast<float>(options_.step_pixels * share);
     pass.step_normal = static_cast<float>(options_.step_normal * share);
     for (int colour = 0; colour < 2; ++colour) {
       pass.colour = colour;
-      add(Kernel::search, pass, view, std::popcount(candidates));
+      pass.candidates = candidates[static_cast<std::size_t>(colour)];
+      add(Kernel::search, pass, view, std::popcount(pass.candidates));
     }
   }
 
