@@ -14,8 +14,9 @@
 // Rounds, the last two over the whole radius, the others over a quarter and a half of it.
 #define REGRESSION_ROUNDS 4
 #define WHOLE_RADIUS_ROUND 2
-// Bit of PASS.candidates.
+// Bits of PASS.candidates: see regress_pixel() and adopt_pixel().
 #define REGRESS_NORMALS 1u
+#define ADOPT_UNSEEN 2u
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
@@ -209,8 +210,10 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     bool has_distance = PASS.step_pixels == 0.0f;
     bool found = false;
     float w = plane.offset;
-    for (int round = has_distance ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
-      if (has_distance && round < WHOLE_RADIUS_ROUND) continue;
+    bool only_normals = has_distance;
+    for (int round = only_normals ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
+      // What has its distance needs but one more round for its normal.
+      if (has_distance && !only_normals && round < REGRESSION_ROUNDS - 1) continue;
       LocalPlane fitted;
       float certainty;
       if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, plane, fitted, certainty)) continue;
@@ -228,11 +231,14 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_prior(CONTEXT PASS.reference, pixel, prior);
 }
 
-// Takes the prior over as the pixel's plane, where it can be seen in a source.
+// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN the cost stays,
+// for another regression to follow that needs none.
 FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
   if (prior.w == 0.0f) return;
   vec3 m = vec3(prior.x, prior.y, prior.z);
-  float cost = patch_cost(CONTEXT pixel, m);
+  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  float cost = held.w;
+  if ((PASS.candidates & ADOPT_UNSEEN) == 0u) cost = patch_cost(CONTEXT pixel, m);
   if (cost < INVALID_COST) store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
 }

@@ -92,6 +92,7 @@ constexpr unsigned source_planes = 1u << 13;
 constexpr unsigned normal = 1u << 9;
 // Of shaders/regression.glsl.
 constexpr unsigned regress_normals = 1;
+constexpr unsigned adopt_unseen = 2;
 
 /// Appends the dispatches of one schedule.
 class Builder {
@@ -247,9 +248,9 @@ class Builder {
     add(Kernel::renew, pass, view, 1);
   }
 
-  /// Only what corrects planes that are nearly right: the near strips, half of them for each colour,
-  /// carry surfaces into what has come into view, perturbations follow what moved; the regression
-  /// then averages.
+  /// Only what corrects planes that are nearly right: the near strips, half of them for each
+  /// colour, carry surfaces into what has come into view, perturbations follow what moved; the
+  /// regression then averages.
   void search_warm() {
     constexpr unsigned perturbations = inverse_distance | both;
     for (int i = 0; i < options_.warm_iterations; ++i) {
@@ -257,9 +258,14 @@ class Builder {
         search(view, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
       }
     }
+    if (options_.warm_regressions == 0) return;
+    // Measured once for all rounds, so that planes need their costs after the last one only.
+    for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
     for (int i = 1; i <= options_.warm_regressions; ++i) {
       const bool last = i == options_.warm_regressions;
-      for (const int view : views_of(0)) regress(view, 0, options_.warm_precision, last);
+      for (const int view : views_of(0)) {
+        regress_measured(view, 0, options_.warm_precision, last ? regress_normals : adopt_unseen);
+      }
     }
   }
 
@@ -316,16 +322,20 @@ class Builder {
 
   /// `precision`: 0 leaves the distances as they are.
   void regress(int view, int level, double precision, bool normals) {
+    add(Kernel::measure, pass_of(view), view, 0);
+    regress_measured(view, level, precision, normals ? regress_normals : 0);
+  }
+
+  void regress_measured(int view, int level, double precision, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene.
     pass.steps =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
     pass.step_pixels = static_cast<float>(precision);
-    pass.candidates = normals ? regress_normals : 0;
-    add(Kernel::measure, pass, view, 0);
+    pass.candidates = how;
     add(Kernel::regress, pass, view, 0);
-    add(Kernel::adopt, pass, view, 1);
+    add(Kernel::adopt, pass, view, (how & adopt_unseen) != 0 ? 0 : 1);
   }
 
   const Options& options_;
