@@ -63,6 +63,8 @@ FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
   }
 }
 
+FN bool is_plane(vec3 m) { return m.x != 0.0f || m.y != 0.0f || m.z != 0.0f; }
+
 // The plane that won the pixel, in the reference frame; zero where none did or the pixel may not hold it.
 FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   vec3 none = vec3(0.0f, 0.0f, 0.0f);
@@ -85,7 +87,7 @@ FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = transferred_plane(CONTEXT pixel, ray);
-  if (dot(m, ray) == 0.0f) m = random_plane(CONTEXT pixel, ray, 0);
+  if (!is_plane(m)) m = random_plane(CONTEXT pixel, ray, 0);
   store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
 }
 
@@ -97,8 +99,7 @@ FN void transfer_keep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   if (usable_ray.w != 0.0f) {
     m = transferred_plane(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z));
   }
-  bool found = m.x != 0.0f || m.y != 0.0f || m.z != 0.0f;
-  store_prior(CONTEXT PASS.reference, pixel, vec4(m, found ? 1.0f : 0.0f));
+  store_prior(CONTEXT PASS.reference, pixel, vec4(m, is_plane(m) ? 1.0f : 0.0f));
 }
 
 // The moved plane of the nearest pixel, about, that has one which this pixel may hold: surfaces continue into what
