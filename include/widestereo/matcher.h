@@ -65,10 +65,10 @@ struct WarmStart {
   /// How points moved in the rig's frame (that of View::world_from_camera, metres) since then:
   /// X now = T X previous, so for poses P of the rig in the world: P(now)^-1 P(previous). Left out
   /// where unknown: the planes then start where they were.
-  std::optional<Eigen::Isometry3d> now_from_previous;
+  std::optional<Eigen::Isometry3d> now_from_previous = std::nullopt;
   /// ViewResult::hypotheses of the previous frame, one for each view; empty: those of this
   /// matcher's last match, which are still on the device.
-  std::vector<cv::Mat> hypotheses;
+  std::vector<cv::Mat> hypotheses = {};
   /// Number of the frame in its sequence; every number draws other random numbers.
   int frame = 1;
 };

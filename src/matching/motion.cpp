@@ -17,10 +17,11 @@ namespace {
 /// Blur of both frames (pixels), coarse to fine: about twice that displacement is bridged.
 constexpr std::array<double, 4> blurs = {8, 4, 2, 1};
 constexpr int most_steps = 12;      // of each blur
-constexpr double last_step = 1e-6;  // radians, and metres in units of the median distance
+constexpr double last_step = 1e-6;  // radians, metres
 constexpr double points_per_view = 6000;
 constexpr std::size_t fewest_points = 200;
-/// Standard deviation (radians) to which every direction of motion must be determined.
+/// Standard deviation to which every direction of motion must be determined: radians, and metres
+/// per metre of the median distance.
 constexpr double largest_uncertainty = 0.003;
 
 /// A point of the previous frame.
@@ -124,12 +125,18 @@ class Alignment {
   bool is_determined(const std::vector<BlurredView>& views) {
     const Normals normals = linearise(views);
     if (normals.points < fewest_points) return false;
-    const Eigen::MatrixXd covariance =
-        normals.variance * normals.information.ldlt().solve(Eigen::MatrixXd::Identity(
-                               normals.information.rows(), normals.information.cols()));
-    if (!covariance.allFinite()) return false;
-    return covariance.diagonal().head<6>().cwiseAbs().maxCoeff() <
-           largest_uncertainty * largest_uncertainty;
+    const Eigen::Index others = normals.information.rows() - 6;
+    Eigen::MatrixXd brightness = normals.information.bottomRightCorner(others, others);
+    brightness.diagonal().array() += 1e-9;
+    const Eigen::MatrixXd shared = normals.information.topRightCorner(6, others);
+    Eigen::Matrix<double, 6, 6> of_motion = normals.information.topLeftCorner<6, 6>() -
+                                            shared * brightness.ldlt().solve(shared.transpose());
+    Eigen::Matrix<double, 6, 1> units;
+    units << 1, 1, 1, Eigen::Vector3d::Constant(median_distance());
+    of_motion = units.asDiagonal() * of_motion * units.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(of_motion);
+    const double weakest = solver.eigenvalues().minCoeff();
+    return normals.variance < weakest * largest_uncertainty * largest_uncertainty;
   }
 
   const Eigen::Isometry3d& motion() const { return motion_; }
@@ -141,6 +148,16 @@ class Alignment {
     double intensity;  ///< of the previous frame: derivative by the gain
     std::size_t view;
   };
+
+  double median_distance() const {
+    std::vector<double> distances;
+    for (const std::vector<Point>& of_view : points_) {
+      for (const Point& point : of_view) distances.push_back(point.position.norm());
+    }
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+  }
 
   std::vector<Row> rows(const std::vector<BlurredView>& views) const {
     std::vector<Row> rows;
