@@ -18,7 +18,7 @@ namespace {
 constexpr std::array<double, 4> blurs = {8, 4, 2, 1};
 constexpr int most_steps = 12;      // of each blur
 constexpr double last_step = 1e-6;  // radians, metres
-constexpr double points_per_view = 6000;
+constexpr double points_per_view = 3000;
 constexpr std::size_t fewest_points = 200;
 /// Standard deviation to which every direction of motion must be determined: radians, and metres
 /// per metre of the median distance.
