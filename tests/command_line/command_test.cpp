@@ -173,9 +173,9 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
 }
 
 TEST_F(Command, HelpAndVersion) {
-  for (const char* arguments :
-       {"--help", "demo --help", "depth --help", "evaluate --help", "calibration --help",
-        "calibration show --help", "devices --help", "--version", "devices", "devices --json"}) {
+  for (const char* arguments : {"--help", "demo --help", "depth --help", "sequence --help",
+                                "evaluate --help", "calibration --help", "calibration show --help",
+                                "devices --help", "--version", "devices", "devices --json"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << outcome.output;
     EXPECT_FALSE(outcome.output.empty());
