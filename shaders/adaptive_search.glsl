@@ -105,7 +105,7 @@ FN vec3 adaptive_candidate(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float
   if (kind == CANDIDATE_SURROUNDINGS) return surroundings_plane(CONTEXT pixel, ray, m);
   if (kind == CANDIDATE_SOURCE_PLANE) return source_plane(CONTEXT source, ray, m);
   vec4 range = PARAMETERS.range;
-  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, kind);
+  vec4 u = draw4(CONTEXT pixel, kind);
   float w = dot(m, ray);
   if (kind == CANDIDATE_RANDOM_DISTANCE) {
     return ((range.z + u.w * (range.w - range.z)) / w) * m;

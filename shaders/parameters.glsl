@@ -19,8 +19,10 @@ struct MatchParameters {
   ivec4 search;       // distance sampling, refinements, best sources, number of views
   vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
                       // preference for far planes
+  ivec4 frame;        // number of the frame since the last one that was started anew; unused
   CameraParameters cameras[MAX_VIEWS];
-  ViewPair pairs[MAX_VIEWS * MAX_VIEWS];  // [reference * MAX_VIEWS + source]: source from reference
+  // [reference * MAX_VIEWS + source]: source from reference; of a view with itself: now from the previous frame
+  ViewPair pairs[MAX_VIEWS * MAX_VIEWS];
 };
 
 // Push constants.
@@ -34,7 +36,8 @@ struct PassParameters {
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
-  uint candidates;  // adaptive search: bit k: candidate kind k is tried; filling: reasons not to fill
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS;
+                    // filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
                       // regression: standard deviation (px) that is enough; 0: normals only
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates

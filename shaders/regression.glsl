@@ -13,6 +13,9 @@
 // Rounds, the last two over the whole radius, the others over a quarter and a half of it.
 #define REGRESSION_ROUNDS 4
 #define WHOLE_RADIUS_ROUND 2
+// Bits of PASS.candidates: see regress_pixel() and adopt_pixel().
+#define REGRESS_NORMALS 1u
+#define ADOPT_UNSEEN 2u
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
@@ -117,7 +120,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float fall_off = 2.0f / float(radius * radius);
   int step = max(radius / 4, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
-  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, REGRESSION_SLOT + round);
+  vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;
   int first_y = int(u.y * float(step)) - step / 2 - radius + radius % step;
   float s = 0.0f;
@@ -184,8 +187,8 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
 }
 
 // Stores the plane of the smallest neighbourhood that determines it to PASS.step_pixels (m, 1) as the pixel's
-// prior, zero where there is none. Without PASS.step_pixels the whole neighbourhood gives the normal, and the
-// pixel keeps its distance.
+// prior, zero where there is none. With REGRESS_NORMALS the whole neighbourhood gives the normal; without
+// PASS.step_pixels it gives nothing else, and the pixel keeps its distance.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -202,18 +205,24 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.slope_x = dot(m, east) / TANGENT_SCALE;
     plane.slope_y = dot(m, south) / TANGENT_SCALE;
     vec4 own = check_at(CONTEXT PASS.reference, pixel);
-    bool normal_only = PASS.step_pixels == 0.0f;
+    bool normals = (PASS.candidates & REGRESS_NORMALS) != 0u;
+    bool has_distance = PASS.step_pixels == 0.0f;
     bool found = false;
     float w = plane.offset;
-    for (int round = normal_only ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
+    bool only_normals = has_distance;
+    for (int round = only_normals ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
+      // What has its distance needs but one more round for its normal.
+      if (has_distance && !only_normals && round < REGRESSION_ROUNDS - 1) continue;
       LocalPlane fitted;
       float certainty;
       if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, plane, fitted, certainty)) continue;
       plane = fitted;
       found = true;
-      if (certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) break;
+      if (!has_distance) w = plane.offset;
+      if (certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) has_distance = true;
+      if (has_distance && !normals) break;
     }
-    if (normal_only) plane.offset = w;
+    plane.offset = w;
     vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
                      (TANGENT_SCALE * plane.slope_y) * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);
@@ -221,11 +230,14 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_prior(CONTEXT PASS.reference, pixel, prior);
 }
 
-// Takes the prior over as the pixel's plane, where it can be seen in a source.
+// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN the cost stays,
+// for another regression to follow that needs none.
 FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
   if (prior.w == 0.0f) return;
   vec3 m = vec3(prior.x, prior.y, prior.z);
-  float cost = patch_cost(CONTEXT pixel, m);
+  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  float cost = held.w;
+  if ((PASS.candidates & ADOPT_UNSEEN) == 0u) cost = patch_cost(CONTEXT pixel, m);
   if (cost < INVALID_COST) store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
 }

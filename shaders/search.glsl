@@ -12,6 +12,12 @@
 #define NEIGHBOUR_UP 4
 #define NEIGHBOUR_DOWN 8
 
+// Random numbers of this iteration and frame.
+FN vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
+  uint seed = PASS.seed + 0x9e3779b9u * uint(PARAMETERS.frame.x);
+  return random4(seed, PASS.reference, pixel, PASS.iteration, slot);
+}
+
 FN vec3 normal_from_angles(float theta, float phi) {
   return vec3(sin(phi) * cos(theta), sin(phi) * sin(theta), cos(phi));
 }
@@ -35,7 +41,7 @@ FN bool admissible(CONTEXT_ARGUMENT vec3 ray, vec3 m) {
 FN vec3 random_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, int slot) {
   vec3 m = vec3(0.0f, 0.0f, 0.0f);
   for (int attempt = 0; attempt < 4; ++attempt) {
-    vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, slot + attempt);
+    vec4 u = draw4(CONTEXT pixel, slot + attempt);
     float distance = draw_distance(CONTEXT u.x);
     m = plane_through(ray, distance, normal_from_angles(2.0f * PI * u.y, PI * u.z));
     if (admissible(CONTEXT ray, m)) return m;
@@ -46,7 +52,7 @@ FN vec3 random_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, int slot) {
 
 // A plane near m: distance and both angles of the normal moved by up to `scale` times their first ranges.
 FN vec3 perturbed_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float scale, int slot) {
-  vec4 u = random4(PASS.seed, PASS.reference, pixel, PASS.iteration, slot);
+  vec4 u = draw4(CONTEXT pixel, slot);
   vec4 range = PARAMETERS.range;
   float w = dot(m, ray);
   float distance = 1.0f / w;

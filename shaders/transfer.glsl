@@ -2,8 +2,13 @@
 // Starts a view from another view's planes: every plane is warped forward, the nearest one wins its pixel.
 // Integer atomics on inverse distances and pixel indices keep the outcome independent of the order.
 
-// Where pixel p of view PASS.other lands in the reference view: top left of its four pixels and its inverse
-// distance there. False where it has no plane or lands outside the model's domain.
+// Pixels along each side of what a plane is warped onto: the four around it, so that the planes of another view,
+// which sees everything at another size, leave no holes. Between two frames of one view the nearest one is enough
+// and does not fatten what is near, frame after frame; renewing fills the holes.
+FN int splat_side(CONTEXT_ARGUMENT_ONLY) { return PASS.other == PASS.reference ? 1 : 2; }
+
+// Where pixel p of view PASS.other lands in the reference view: top left of its pixels and its inverse distance
+// there. False where it has no plane or lands outside the model's domain.
 FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inverse_distance) {
   corner = ivec2(0, 0);
   inverse_distance = 0.0f;
@@ -23,7 +28,8 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   }
   float w = dot(m, unit_ray);
   inverse_distance = w / length(direction_in_source(pair, unit_ray, w));
-  corner = ivec2(int(floor(position.x)), int(floor(position.y)));
+  float offset = splat_side(CONTEXT_ONLY) == 1 ? 0.5f : 0.0f;
+  corner = ivec2(int(floor(position.x + offset)), int(floor(position.y + offset)));
   return true;
 }
 
@@ -33,7 +39,8 @@ FN void transfer_nearest_pixel(CONTEXT_ARGUMENT ivec2 p) {
   ivec2 corner;
   float inverse_distance;
   if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
-  for (int i = 0; i < 4; ++i) {
+  int side = splat_side(CONTEXT_ONLY);
+  for (int i = 0; i < side * side; ++i) {
     ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
     if (in_image(PARAMETERS.cameras[PASS.reference].size, q)) {
       transfer_nearest_raise(CONTEXT q, float_as_uint(inverse_distance));
@@ -46,13 +53,30 @@ FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
   float inverse_distance;
   if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
   uint index = uint(p.y * PARAMETERS.cameras[PASS.other].size.x + p.x);
-  for (int i = 0; i < 4; ++i) {
+  int side = splat_side(CONTEXT_ONLY);
+  for (int i = 0; i < side * side; ++i) {
     ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
     if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
     // Tolerant, because another kernel may have rounded the same inverse distance differently.
     float nearest = uint_as_float(transfer_nearest_at(CONTEXT q));
     if (inverse_distance >= nearest * 0.9999f) transfer_winner_lower(CONTEXT q, index);
   }
+}
+
+FN bool is_plane(vec3 m) { return m.x != 0.0f || m.y != 0.0f || m.z != 0.0f; }
+
+// The plane that won the pixel, in the reference frame; zero where none did or the pixel may not hold it.
+FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  vec3 none = vec3(0.0f, 0.0f, 0.0f);
+  uint index = transfer_winner_at(CONTEXT pixel);
+  if (index == 0xffffffffu) return none;
+  int width = PARAMETERS.cameras[PASS.other].size.x;
+  ivec2 p = ivec2(int(index) % width, int(index) / width);
+  vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
+  ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
+  vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
+  if (admissible(CONTEXT ray, moved)) return moved;
+  return none;
 }
 
 FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -62,15 +86,48 @@ FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     return;
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec3 m = random_plane(CONTEXT pixel, ray, 0);
-  uint index = transfer_winner_at(CONTEXT pixel);
-  if (index != 0xffffffffu) {
-    int width = PARAMETERS.cameras[PASS.other].size.x;
-    ivec2 p = ivec2(int(index) % width, int(index) / width);
-    vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
-    ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
-    vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
-    if (admissible(CONTEXT ray, moved)) m = moved;
+  vec3 m = transferred_plane(CONTEXT pixel, ray);
+  if (!is_plane(m)) m = random_plane(CONTEXT pixel, ray, 0);
+  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+}
+
+// The same between two frames of one view, PASS.other being the reference: the moved planes go where the priors
+// are, since other pixels still read the planes that they come from. (m, 1), zero where there is none.
+FN void transfer_keep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec3 m = vec3(0.0f, 0.0f, 0.0f);
+  if (usable_ray.w != 0.0f) {
+    m = transferred_plane(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z));
   }
+  store_prior(CONTEXT PASS.reference, pixel, vec4(m, is_plane(m) ? 1.0f : 0.0f));
+}
+
+// The moved plane of the nearest pixel, about, that has one which this pixel may hold: surfaces continue into what
+// comes into view. A random plane where there is none.
+FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  for (int radius = 1; radius <= 32; radius *= 2) {
+    for (int i = 0; i < 8; ++i) {
+      int side = i < 4 ? i : i + 1;  // without the middle of 3x3
+      ivec2 q = ivec2(pixel.x + radius * (side % 3 - 1), pixel.y + radius * (side / 3 - 1));
+      if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
+      vec4 prior = prior_at(CONTEXT PASS.reference, q);
+      vec3 m = vec3(prior.x, prior.y, prior.z);
+      if (prior.w != 0.0f && admissible(CONTEXT ray, m)) return m;
+    }
+  }
+  return random_plane(CONTEXT pixel, ray, 0);
+}
+
+// Starts a pixel from the plane that has moved there.
+FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (!is_usable(CONTEXT pixel, usable_ray)) {
+    store_no_plane(CONTEXT pixel);
+    return;
+  }
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
+  vec3 m = vec3(prior.x, prior.y, prior.z);
+  if (prior.w == 0.0f) m = moved_plane_nearby(CONTEXT pixel, ray);
   store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
 }

@@ -13,6 +13,7 @@
 #include "random.glsl"
 #include "patch.glsl"
 #include "search.glsl"
+#include "pyramid.glsl"
 #include "transfer.glsl"
 
 void main() {

@@ -6,6 +6,7 @@
 
 void add_demo_command(CLI::App& app);
 void add_depth_command(CLI::App& app);
+void add_sequence_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_calibration_command(CLI::App& app);
 void add_devices_command(CLI::App& app);

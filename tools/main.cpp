@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", WIDESTEREO_VERSION);
   add_demo_command(app);
   add_depth_command(app);
+  add_sequence_command(app);
   add_evaluate_command(app);
   add_calibration_command(app);
   add_devices_command(app);

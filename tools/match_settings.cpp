@@ -84,6 +84,9 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
   add("--step-normal", step_normal, "First perturbation of a unit normal");
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");
+  add("--warm-iterations", warm_iterations, "Iterations of a frame started from the previous one");
+  add("--warm-regressions", warm_regressions, "Plane regressions of such a frame");
+  add("--warm-precision", warm_precision, "Their precision, pixels");
   add("--best-sources", best_sources, "Cost = mean over this many best source views");
   add("--min-texture", min_texture, "Smallest standard deviation of a patch, grey levels of 255");
   add("--min-visible", min_visible, "Share of a patch that must be seen in the source");
@@ -133,6 +136,9 @@ Options MatchSettings::options() const {
   take(options.step_pixels, step_pixels);
   take(options.step_normal, step_normal);
   take(options.source_planes, source_planes);
+  take(options.warm_iterations, warm_iterations);
+  take(options.warm_regressions, warm_regressions);
+  take(options.warm_precision, warm_precision);
   take(options.best_sources, best_sources);
   take(options.min_texture, min_texture);
   take(options.min_visible, min_visible);

@@ -21,9 +21,9 @@ struct MatchSettings {
       ambiguity_margin, far_preference;
   std::optional<int> repair_radius, fill_radius;
   std::optional<double> consistency_relative, consistency_pixels;
-  std::optional<int> levels, sweep_steps, regression_radius;
+  std::optional<int> levels, sweep_steps, regression_radius, warm_iterations, warm_regressions;
   std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,
-      step_normal;
+      step_normal, warm_precision;
   std::optional<bool> source_planes;
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;

@@ -8,22 +8,30 @@
 
 namespace ws = widestereo;
 
+ws::Device open_device(const MatchSettings& settings) {
+  ws::Device device = ws::Device::open(settings.device);
+  if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
+  return device;
+}
+
+void require_no_validation_messages(const ws::Device& device) {
+  const std::vector<std::string> messages = device.validation_messages();
+  if (messages.empty()) return;
+  throw ws::Error(std::to_string(messages.size()) +
+                  " message(s) of the Vulkan validation layers; the first: " + messages.front());
+}
+
 MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
                          const std::vector<cv::Mat>& images) {
   MatchingRun run;
   run.options = settings.options();
-  ws::Device device = ws::Device::open(settings.device);
+  ws::Device device = open_device(settings);
   run.device = device.info();
-  if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
   ws::Matcher matcher(device, rig, run.options);
   {
     ProgressBar bar("Matching on " + device.info().name);
     run.result = matcher.match(images, [&bar](double share) { bar.show(share); });
   }
-  const std::vector<std::string> messages = device.validation_messages();
-  if (!messages.empty()) {
-    throw ws::Error(std::to_string(messages.size()) +
-                    " message(s) of the Vulkan validation layers; the first: " + messages.front());
-  }
+  require_no_validation_messages(device);
   return run;
 }

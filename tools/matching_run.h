@@ -15,6 +15,12 @@ struct MatchingRun {
   widestereo::StereoResult result;
 };
 
+/// Opens the device and reports, on standard error, those passed over.
+widestereo::Device open_device(const MatchSettings& settings);
+
+/// Throws Error when validation was asked for and reported anything.
+void require_no_validation_messages(const widestereo::Device& device);
+
 /// Throws Error also when validation was asked for and reported anything.
 MatchingRun match_images(const MatchSettings& settings, const widestereo::Rig& rig,
                          const std::vector<cv::Mat>& images);

@@ -12,6 +12,8 @@ class ProgressBar {
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
+  /// Whether anyone sees it.
+  bool visible() const { return terminal_; }
   /// `share` in [0, 1].
   void show(double share);
 

@@ -16,6 +16,14 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+/// Share of the pixels that have a ray.
+double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
+  const int usable = cv::countNonZero((view.reasons & ws::reason_no_ray) == 0);
+  return cv::countNonZero(pixels) / std::max<double>(usable, 1);
+}
+
+constexpr const char* group = "Output";
+
 /// Writes the files of one view and notes their names.
 class ViewWriter {
  public:
@@ -33,15 +41,13 @@ class ViewWriter {
     if (!format_.no_cloud) write_cloud();
     if (!format_.no_pictures) write_pictures();
     const ws::ConsistencyScores scores = ws::consistency_scores(result_.differences, result_.cost);
-    const double usable = cv::countNonZero((result_.reasons & ws::reason_no_ray) == 0);
     return {{"name", view_.name},
             {"model", to_string(view_.camera.model)},
             {"width", view_.camera.width},
             {"height", view_.camera.height},
             {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
-            {"accepted", cv::countNonZero(result_.reasons == 0) / std::max(usable, 1.0)},
-            {"filled",
-             cv::countNonZero(result_.reasons & ws::reason_filled) / std::max(usable, 1.0)},
+            {"accepted", accepted_share(result_)},
+            {"filled", share_of_usable(result_, (result_.reasons & ws::reason_filled) != 0)},
             {"mean_cost", scores.mean_cost},
             {"cost_below_0.2", scores.low_cost},
             {"consistent_within_2_percent", scores.consistent_relative},
@@ -151,19 +157,34 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
 
 }  // namespace
 
-void FolderFormat::add_to(CLI::App& command) {
-  const std::string output = "Output";
+double accepted_share(const ws::ViewResult& view) {
+  return share_of_usable(view, view.reasons == 0);
+}
+
+void FolderFormat::add_maps_to(CLI::App& command) {
   command.add_option("--formats", maps, "Distance maps: tiff, pfm, png (several by comma)")
       ->delimiter(',')
       ->check(CLI::IsMember({"tiff", "pfm", "png"}))
       ->capture_default_str()
-      ->group(output);
+      ->group(group);
   command.add_option("--png-scale", png_scale, "Units per metre of 16-bit PNG distances")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
-      ->group(output);
-  command.add_flag("--no-cloud", no_cloud, "Do not write point clouds")->group(output);
-  command.add_flag("--no-pictures", no_pictures, "Do not write preview pictures")->group(output);
+      ->group(group);
+}
+
+void FolderFormat::add_to(CLI::App& command) {
+  add_maps_to(command);
+  command.add_flag("--no-cloud", no_cloud, "Do not write point clouds")->group(group);
+  command.add_flag("--no-pictures", no_pictures, "Do not write preview pictures")->group(group);
+}
+
+void FolderFormat::add_for_many_frames_to(CLI::App& command) {
+  add_maps_to(command);
+  no_cloud = no_pictures = true;
+  command.add_flag("--clouds{false}", no_cloud, "Write point clouds (camera's frame)")
+      ->group(group);
+  command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
 }
 
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,

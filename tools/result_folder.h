@@ -18,8 +18,17 @@ struct FolderFormat {
   double png_scale = 1000;                   ///< units per metre of the 16-bit PNG
   bool no_cloud = false;
   bool no_pictures = false;
+  /// Adds --formats, --png-scale, --no-cloud and --no-pictures.
   void add_to(CLI::App& command);
+  /// The same for many frames, with --clouds and --pictures: neither is written unless asked for.
+  void add_for_many_frames_to(CLI::App& command);
+
+ private:
+  void add_maps_to(CLI::App& command);
 };
+
+/// How much of a view's lens was accepted, in [0, 1].
+double accepted_share(const widestereo::ViewResult& view);
 
 struct FolderContents {
   const widestereo::Rig& rig;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -64,6 +65,19 @@ struct StereoResult {
 /// `distance` with rejected pixels (reasons != 0) that were not filled set to 0.
 cv::Mat accepted_distance(const ViewResult& view);
 
+/// How a frame of a sequence starts from the frame before it.
+struct WarmStart {
+  /// How points moved in the rig's frame (that of View::world_from_camera, metres) since then:
+  /// X now = T X previous, so for poses P of the rig in the world: P(now)^-1 P(previous). Left out
+  /// where unknown: the planes then start where they were.
+  std::optional<Eigen::Isometry3d> now_from_previous = std::nullopt;
+  /// ViewResult::hypotheses of the previous frame, one for each view; empty: those of this
+  /// matcher's last match, which are still on the device.
+  std::vector<cv::Mat> hypotheses = {};
+  /// Number of the frame in its sequence; every number draws other random numbers.
+  int frame = 1;
+};
+
 /// Matches images of one rig; made once, used for many frames of the same sizes.
 /// Not thread-safe; matchers are independent of each other and must not outlive their device.
 class Matcher {
@@ -83,6 +97,12 @@ class Matcher {
   StereoResult match(const cv::Mat& left, const cv::Mat& right, const Progress& progress = {}) {
     return match(std::vector<cv::Mat>{left, right}, progress);
   }
+
+  /// The same for the next frame of a sequence, from the previous frame's planes instead of from
+  /// none (Options::warm_iterations): a fraction of the work where most of the scene was seen
+  /// before. Throws Error where there are no such planes.
+  StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
+                          const Progress& progress = {});
 
  private:
   class Implementation;

@@ -81,6 +81,14 @@ struct Options {
   double step_normal = 0.5;   ///< first perturbation of a unit normal; halved each iteration
   bool source_planes = true;  ///< try the planes that the source views hold
 
+  /// Of a frame that starts from the previous one's planes (Matcher::match_next()).
+  int warm_iterations = 8;  ///< of every view, all at full size, >= 0
+  /// SearchMethod::pyramid: rounds of plane regression, >= 0, and the precision (see
+  /// regression_precision) that ends each: less than a cold frame's, because frames average, too,
+  /// and neighbourhoods that overlap from frame to frame would spread across edges.
+  int warm_regressions = 2;
+  double warm_precision = 0.025;
+
   double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation
                              ///< carry no information
   double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0..1

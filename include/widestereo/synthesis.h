@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -28,6 +29,11 @@ struct RenderedPair {
 /// degrees off axis. `size` is the side of the square images in pixels; the field of view does not
 /// depend on it.
 RenderedPair render_demo(int size, std::uint32_t seed = 1);
+
+/// The same seen after the rig has moved to `world_from_rig` (metres; the demo is the identity).
+/// The rig returned is the calibration, which does not move.
+RenderedPair render_demo_from(const Eigen::Isometry3d& world_from_rig, int size,
+                              std::uint32_t seed = 1);
 
 /// Nearest and farthest distance (metres) that suit the demo scene.
 std::pair<double, double> demo_distance_range();

@@ -34,7 +34,9 @@ constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
     kernel::cpu::regress_pixel,
     kernel::cpu::adopt_pixel,
     kernel::cpu::fill_pixel,
-    kernel::cpu::adopt_fill_pixel};
+    kernel::cpu::adopt_fill_pixel,
+    kernel::cpu::transfer_keep_pixel,
+    kernel::cpu::renew_pixel};
 
 class CpuBackend final : public Backend {
  public:

@@ -148,6 +148,8 @@ ENTRY_POINT(regress, reference)
 ENTRY_POINT(adopt, reference)
 ENTRY_POINT(fill, reference)
 ENTRY_POINT(adopt_fill, reference)
+ENTRY_POINT(transfer_keep, reference)
+ENTRY_POINT(renew, reference)
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}
@@ -176,7 +178,8 @@ struct PyramidKernels {
   template <class C>
   KernelTable operator()(C) const {
     static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C), KERNEL_ENTRY(upsample, C),
-                                          KERNEL_ENTRY(search, C), KERNEL_ENTRY(adopt, C)};
+                                          KERNEL_ENTRY(search, C), KERNEL_ENTRY(adopt, C),
+                                          KERNEL_ENTRY(renew, C)};
     return table_of(entries);
   }
 };

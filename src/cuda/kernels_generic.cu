@@ -13,7 +13,8 @@ KernelTable generic_kernels() {
       KERNEL_ENTRY(sweep, C),           KERNEL_ENTRY(upsample, C),
       KERNEL_ENTRY(search, C),          KERNEL_ENTRY(measure, C),
       KERNEL_ENTRY(regress, C),         KERNEL_ENTRY(adopt, C),
-      KERNEL_ENTRY(fill, C),            KERNEL_ENTRY(adopt_fill, C)};
+      KERNEL_ENTRY(fill, C),            KERNEL_ENTRY(adopt_fill, C),
+      KERNEL_ENTRY(transfer_keep, C),   KERNEL_ENTRY(renew, C)};
   return table_of(entries);
 }
 

@@ -6,7 +6,7 @@
 namespace widestereo {
 
 MatchSetup::MatchSetup(const Rig& rig, const Options& options, DeviceKind kind)
-    : schedule(make_schedule(rig, options)) {
+    : schedule(make_schedule(rig, options)), warm_schedule(make_warm_schedule(rig, options)) {
   if (options.propagation == Propagation::raster && kind != DeviceKind::cpu) {
     throw Error(
         "Raster-order propagation is sequential and runs on the CPU only; choose the "

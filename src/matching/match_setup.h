@@ -15,7 +15,8 @@ struct MatchSetup {
   MatchSetup(const Rig& rig, const Options& options, DeviceKind kind);
   void set_rays(Backend& backend) const;
 
-  Schedule schedule;
+  Schedule schedule;       ///< of a frame by itself
+  Schedule warm_schedule;  ///< of one that starts from the previous one; set_motion() completes it
   std::vector<cv::Size> sizes;  ///< of each view at each level
   std::vector<cv::Mat> rays;    ///< likewise
 };

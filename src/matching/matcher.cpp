@@ -59,6 +59,15 @@ void require_overlap(const std::vector<ViewResult>& views) {
       "range; check the calibration, the order of the images, masks and the range.");
 }
 
+void require_planes(const cv::Mat& hypotheses, const View& view) {
+  const cv::Size size(view.camera.width, view.camera.height);
+  if (hypotheses.size() == size && hypotheses.type() == CV_32FC4) return;
+  throw Error("The planes to start " + view.name + " from are " + std::to_string(hypotheses.cols) +
+              "x" + std::to_string(hypotheses.rows) + " of type " +
+              cv::typeToString(hypotheses.type()) + ", but " + std::to_string(size.width) + "x" +
+              std::to_string(size.height) + " of CV_32FC4 are needed.");
+}
+
 void unpack_checks(const cv::Mat& checks, ViewResult& result) {
   std::vector<cv::Mat> channels;
   cv::split(checks, channels);
@@ -79,6 +88,32 @@ class Matcher::Implementation {
   }
 
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress) {
+    return run(setup_.schedule, images, progress);
+  }
+
+  StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
+                          const Progress& progress) {
+    if (start.hypotheses.empty() && !holds_planes_) {
+      throw Error(
+          "There are no planes of a previous frame to start from; match one without a warm start "
+          "or give its planes.");
+    }
+    if (!start.hypotheses.empty() && start.hypotheses.size() != rig_.views.size()) {
+      throw Error("The rig has " + std::to_string(rig_.views.size()) + " views, but planes of " +
+                  std::to_string(start.hypotheses.size()) + " were given to start from.");
+    }
+    for (std::size_t i = 0; i < start.hypotheses.size(); ++i) {
+      require_planes(start.hypotheses[i], rig_.views[i]);
+      backend_->set_hypotheses(static_cast<int>(i), start.hypotheses[i]);
+    }
+    set_motion(setup_.warm_schedule, rig_,
+               start.now_from_previous.value_or(Eigen::Isometry3d::Identity()), start.frame);
+    return run(setup_.warm_schedule, images, progress);
+  }
+
+ private:
+  StereoResult run(const Schedule& schedule, const std::vector<cv::Mat>& images,
+                   const Progress& progress) {
     const auto start = std::chrono::steady_clock::now();
     if (images.size() != rig_.views.size()) {
       throw Error("The rig has " + std::to_string(rig_.views.size()) + " views, but " +
@@ -88,7 +123,9 @@ class Matcher::Implementation {
       backend_->set_intensity(static_cast<int>(i),
                               masked_intensities(images[i], rig_.views[i], setup_.rays[i]));
     }
-    backend_->run(setup_.schedule, progress);
+    holds_planes_ = false;
+    backend_->run(schedule, progress);
+    holds_planes_ = true;
 
     StereoResult result;
     for (std::size_t i = 0; i < images.size(); ++i) {
@@ -98,7 +135,7 @@ class Matcher::Implementation {
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
     }
     require_overlap(result.views);
-    for (const Dispatch& dispatch : setup_.schedule.dispatches) result.samples += dispatch.samples;
+    for (const Dispatch& dispatch : schedule.dispatches) result.samples += dispatch.samples;
     result.times = backend_->times();
     result.device_bytes = backend_->device_bytes();
     result.milliseconds =
@@ -106,10 +143,10 @@ class Matcher::Implementation {
     return result;
   }
 
- private:
   Rig rig_;
   MatchSetup setup_;
   std::unique_ptr<Backend> backend_;
+  bool holds_planes_ = false;  // of a frame that was matched to the end
 };
 
 cv::Mat accepted_distance(const ViewResult& view) {
@@ -127,6 +164,11 @@ Matcher& Matcher::operator=(Matcher&&) noexcept = default;
 
 StereoResult Matcher::match(const std::vector<cv::Mat>& images, const Progress& progress) {
   return implementation_->match(images, progress);
+}
+
+StereoResult Matcher::match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
+                                 const Progress& progress) {
+  return implementation_->match_next(images, start, progress);
 }
 
 }  // namespace widestereo

@@ -42,6 +42,7 @@ Options Options::preset_named(const std::string& name) {
   options.min_texture = 0;
   options.max_cost = 0.8;
   options.far_preference = 0.08;
+  options.warm_iterations = 1;
   if (name == "fast") {
     options.pattern = PatchPattern::checkerboard;
     options.sweep_steps = 16;
@@ -94,6 +95,9 @@ void validate(const Options& o) {
   require_between(o.regression_precision, 1e-6, 1000, "regression precision");
   require_between(o.step_pixels, 0, 1000, "step pixels");
   require_between(o.step_normal, 0, 2, "step normal");
+  require_between(o.warm_iterations, 0, 100000, "warm iterations");
+  require_between(o.warm_regressions, 0, 1000, "warm regressions");
+  require_between(o.warm_precision, 1e-6, 1000, "warm precision");
   require_between(o.min_texture, 0, 255, "min texture");
   require_between(o.min_visible, 0, 1, "min visible");
   require_between(o.consistency_relative, 0, 1000, "consistency (relative)");
@@ -136,6 +140,9 @@ std::string to_json(const Options& o) {
                                        {"second_iterations", o.second_iterations},
                                        {"refinements", o.refinements},
                                        {"best_sources", o.best_sources},
+                                       {"warm_iterations", o.warm_iterations},
+                                       {"warm_regressions", o.warm_regressions},
+                                       {"warm_precision", o.warm_precision},
                                        {"min_texture", o.min_texture},
                                        {"min_visible", o.min_visible},
                                        {"consistency_relative", o.consistency_relative},

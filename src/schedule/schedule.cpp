@@ -22,14 +22,13 @@ constexpr int right_and_down = 2 | 8;
 // The blocks are uploaded as they are: their layout must be std140 (parameters) and std430 (pass).
 static_assert(sizeof(kernel::CameraParameters) == 80);
 static_assert(sizeof(kernel::ViewPair) == 48);
-static_assert(offsetof(kernel::MatchParameters, cameras) == 80);
-static_assert(offsetof(kernel::MatchParameters, pairs) == 80 + 80 * MAX_VIEWS);
+static_assert(offsetof(kernel::MatchParameters, cameras) == 96);
+static_assert(offsetof(kernel::MatchParameters, pairs) == 96 + 80 * MAX_VIEWS);
 static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
 static_assert(sizeof(kernel::PassParameters) == 52);
 
-kernel::ViewPair view_pair(const View& source, const View& reference) {
-  const Eigen::Matrix<float, 3, 4> t =
-      source_from_reference(source, reference).matrix().topRows<3>().cast<float>();
+kernel::ViewPair view_pair(const Eigen::Isometry3d& source_from_reference) {
+  const Eigen::Matrix<float, 3, 4> t = source_from_reference.matrix().topRows<3>().cast<float>();
   const auto row = [&t](int i) { return kernel::vec4(t(i, 0), t(i, 1), t(i, 2), t(i, 3)); };
   return {row(0), row(1), row(2)};
 }
@@ -54,7 +53,7 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, const Opt
   for (int i = 0; i < views; ++i) {
     p.cameras[i] = kernel_camera(all[i].camera);
     for (int j = 0; j < views; ++j) {
-      p.pairs[i * MAX_VIEWS + j] = view_pair(all[j], all[i]);
+      p.pairs[i * MAX_VIEWS + j] = view_pair(source_from_reference(all[j], all[i]));
     }
   }
   return p;
@@ -85,6 +84,7 @@ std::vector<View> pyramid(const Rig& rig, int levels) {
 }
 
 // Candidate kinds of shaders/adaptive_search.glsl.
+constexpr std::array<unsigned, 2> near_strips = {1 | 4, 2 | 8};  // up and left, down and right
 constexpr unsigned strips = 0xff;
 constexpr unsigned inverse_distance = 1u << 8;
 constexpr unsigned both = 1u << 10;
@@ -92,6 +92,9 @@ constexpr unsigned random_distance = 1u << 11;
 constexpr unsigned surroundings = 1u << 12;
 constexpr unsigned source_planes = 1u << 13;
 constexpr unsigned normal = 1u << 9;
+// Of shaders/regression.glsl.
+constexpr unsigned regress_normals = 1;
+constexpr unsigned adopt_unseen = 2;
 
 /// Appends the dispatches of one schedule.
 class Builder {
@@ -121,18 +124,32 @@ class Builder {
     schedule_.parameters = match_parameters(schedule_.views, options);
   }
 
-  Schedule build() {
+  Schedule build_cold() {
     if (options_.search == SearchMethod::pyramid) {
       build_pyramid();
     } else {
       build_random();
     }
+    return finished();
+  }
+
+  Schedule build_warm() {
+    for (const int view : views_of(0)) move_on(view);
+    if (options_.search == SearchMethod::pyramid) {
+      search_warm();
+    } else {
+      for (const int view : views_of(0)) iterate(view, options_.warm_iterations);
+    }
+    return finished();
+  }
+
+ private:
+  Schedule finished() {
     check_and_fill(options_.ambiguity_margin > 0 ? other_places : 0, options_.fill_radius,
                    reason_no_ray);
     return std::move(schedule_);
   }
 
- private:
   void build_random() {
     start_at_random(0);
     iterate(0, options_.first_iterations);
@@ -157,17 +174,18 @@ class Builder {
       const int place = levels_ - 1 - level;
       for (int i = 0; i < options_.level_iterations[place]; ++i) {
         const bool first = i == 0 && level == levels_ - 1;
-        for (const int view : views_of(level)) search(view, i, first);
+        const unsigned candidates = cold_candidates(first);
+        for (const int view : views_of(level)) search(view, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
-        for (const int view : views_of(level)) regress(view, level, options_.regression_precision);
-        if (level == 0 && options_.repair_radius > 0) {
-          check_and_fill(0, options_.repair_radius, reason_no_ray | reason_no_overlap);
+        for (const int view : views_of(level)) {
+          regress(view, level, options_.regression_precision, false);
         }
+        if (level == 0) repair();
       }
     }
     if (options_.level_regressions.back() > 0) {
-      for (const int view : views_of(0)) regress(view, 0, normal_only);
+      for (const int view : views_of(0)) regress(view, 0, 0, true);
     }
   }
 
@@ -225,6 +243,37 @@ class Builder {
     add(Kernel::transfer_gather, pass, view, 1);
   }
 
+  void move_on(int view) {
+    const kernel::PassParameters pass = pass_of(view);
+    add(Kernel::transfer_clear, pass, view, 0);
+    add(Kernel::transfer_nearest, pass, view, 0);
+    add(Kernel::transfer_winner, pass, view, 0);
+    add(Kernel::transfer_keep, pass, view, 0);
+    add(Kernel::renew, pass, view, 1);
+  }
+
+  /// Only what corrects planes that are nearly right: the near strips, half of them for each
+  /// colour, carry surfaces into what has come into view, perturbations follow what moved; the
+  /// regression then averages.
+  void search_warm() {
+    constexpr unsigned perturbations = inverse_distance | both;
+    for (int i = 0; i < options_.warm_iterations; ++i) {
+      for (const int view : views_of(0)) {
+        search(view, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
+      }
+    }
+    if (options_.warm_regressions == 0) return;
+    repair();
+    // Measured once for all rounds, so that planes need their costs after the last one only.
+    for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
+    for (int i = 1; i <= options_.warm_regressions; ++i) {
+      const bool last = i == options_.warm_regressions;
+      for (const int view : views_of(0)) {
+        regress_measured(view, 0, options_.warm_precision, last ? regress_normals : adopt_unseen);
+      }
+    }
+  }
+
   void iterate(int view, int iterations) {
     kernel::PassParameters pass = pass_of(view);
     for (int iteration = 1; iteration <= iterations; ++iteration) {
@@ -254,32 +303,44 @@ class Builder {
     add(Kernel::sweep, pass, view, options_.sweep_steps);
   }
 
-  void search(int view, int iteration, bool first) {
+  unsigned cold_candidates(bool first) const {
+    unsigned candidates = strips | inverse_distance | both | surroundings;
+    if (options_.pattern == PatchPattern::dense) candidates |= normal;
+    if (first) candidates |= random_distance;
+    if (options_.source_planes && !first) candidates |= source_planes;
+    return candidates;
+  }
+
+  /// `candidates`: of each colour.
+  void search(int view, int iteration, const std::array<unsigned, 2>& candidates) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = iteration + 1;
-    pass.candidates = strips | inverse_distance | both | surroundings;
-    if (options_.pattern == PatchPattern::dense) pass.candidates |= normal;
-    if (first) pass.candidates |= random_distance;
-    if (options_.source_planes && !first) pass.candidates |= source_planes;
     const double share = std::pow(0.5, iteration);
     pass.step_pixels = static_cast<float>(options_.step_pixels * share);
     pass.step_normal = static_cast<float>(options_.step_normal * share);
     for (int colour = 0; colour < 2; ++colour) {
       pass.colour = colour;
+      pass.candidates = candidates[static_cast<std::size_t>(colour)];
       add(Kernel::search, pass, view, std::popcount(pass.candidates));
     }
   }
 
-  void regress(int view, int level, double precision) {
+  /// `precision`: 0 leaves the distances as they are.
+  void regress(int view, int level, double precision, bool normals) {
+    add(Kernel::measure, pass_of(view), view, 0);
+    regress_measured(view, level, precision, normals ? regress_normals : 0);
+  }
+
+  void regress_measured(int view, int level, double precision, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene.
     pass.steps =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
     pass.step_pixels = static_cast<float>(precision);
-    add(Kernel::measure, pass, view, 0);
+    pass.candidates = how;
     add(Kernel::regress, pass, view, 0);
-    add(Kernel::adopt, pass, view, 1);
+    add(Kernel::adopt, pass, view, (how & adopt_unseen) != 0 ? 0 : 1);
   }
 
   /// Checks every view, then fills: filled planes must not count as a source's own.
@@ -299,8 +360,13 @@ class Builder {
     }
   }
 
+  /// Lets pixels that fail the checks try the planes around them.
+  void repair() {
+    if (options_.repair_radius == 0) return;
+    check_and_fill(0, options_.repair_radius, reason_no_ray | reason_no_overlap);
+  }
+
   static constexpr int other_places = 6;
-  static constexpr double normal_only = 0;
   const Options& options_;
   int levels_ = 1;
   int views_of_rig_ = 2;
@@ -308,25 +374,58 @@ class Builder {
   Schedule schedule_;
 };
 
-}  // namespace
-
-const char* to_string(Kernel kernel) {
-  static constexpr std::array<const char*, kernel_count> names = {
-      "initialise",      "iterate",         "iterate_raster", "transfer_clear", "transfer_nearest",
-      "transfer_winner", "transfer_gather", "check",          "downsample",     "sweep",
-      "upsample",        "search",          "measure",        "regress",        "adopt",
-      "fill",            "adopt_fill"};
-  return names[static_cast<std::size_t>(kernel)];
-}
-
-Schedule make_schedule(const Rig& rig, const Options& options) {
+void require_usable(const Rig& rig, const Options& options) {
   if (rig.views.size() < 2 || rig.views.size() > MAX_VIEWS) {
     throw Error("The rig has " + std::to_string(rig.views.size()) + " view(s); stereo needs 2 to " +
                 std::to_string(MAX_VIEWS) + ".");
   }
   validate(rig, "The rig");
   validate(options);
-  return Builder(rig, options).build();
+}
+
+}  // namespace
+
+const char* to_string(Kernel kernel) {
+  static constexpr std::array<const char*, kernel_count> names = {"initialise",
+                                                                  "iterate",
+                                                                  "iterate_raster",
+                                                                  "transfer_clear",
+                                                                  "transfer_nearest",
+                                                                  "transfer_winner",
+                                                                  "transfer_gather",
+                                                                  "check",
+                                                                  "downsample",
+                                                                  "sweep",
+                                                                  "upsample",
+                                                                  "search",
+                                                                  "measure",
+                                                                  "regress",
+                                                                  "adopt",
+                                                                  "fill",
+                                                                  "adopt_fill",
+                                                                  "transfer_keep",
+                                                                  "renew"};
+  return names[static_cast<std::size_t>(kernel)];
+}
+
+Schedule make_schedule(const Rig& rig, const Options& options) {
+  require_usable(rig, options);
+  return Builder(rig, options).build_cold();
+}
+
+Schedule make_warm_schedule(const Rig& rig, const Options& options) {
+  require_usable(rig, options);
+  return Builder(rig, options).build_warm();
+}
+
+void set_motion(Schedule& schedule, const Rig& rig, const Eigen::Isometry3d& now_from_previous,
+                int frame) {
+  schedule.parameters.frame.x = frame;
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    const Eigen::Isometry3d& rig_from_camera = rig.views[i].world_from_camera;
+    schedule.parameters.pairs[i * MAX_VIEWS + i] =
+        view_pair(rig_from_camera.inverse() * now_from_previous * rig_from_camera);
+  }
 }
 
 }  // namespace widestereo

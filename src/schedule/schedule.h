@@ -30,8 +30,10 @@ enum class Kernel {
   adopt,             ///< takes those planes over
   fill,              ///< planes of accepted pixels for the rejected ones around them
   adopt_fill,        ///< takes those planes over and marks the pixels
+  transfer_keep,     ///< keeps a view's own planes, moved on from the previous frame
+  renew,             ///< starts a view from those
 };
-inline constexpr int kernel_count = 17;
+inline constexpr int kernel_count = 19;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).
@@ -66,5 +68,14 @@ struct Schedule {
 /// Throws Error when rig or options are invalid, or there are fewer than 2 or more than MAX_VIEWS
 /// views.
 Schedule make_schedule(const Rig& rig, const Options& options);
+
+/// The schedule of a frame that starts from the planes which the views hold, those of the previous
+/// frame, with the same constants and views; set_motion() completes it. Throws as make_schedule().
+Schedule make_warm_schedule(const Rig& rig, const Options& options);
+
+/// Sets how the rig moved since the previous frame, and which frame this is since a cold one; the
+/// dispatches stay the same. `now_from_previous`: X now = T X then, in the rig's frame (metres).
+void set_motion(Schedule& schedule, const Rig& rig, const Eigen::Isometry3d& now_from_previous,
+                int frame);
 
 }  // namespace widestereo

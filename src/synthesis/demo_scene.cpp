@@ -88,7 +88,17 @@ Rig demo_rig(int size) {
 std::pair<double, double> demo_distance_range() { return {0.4, 8}; }
 
 RenderedPair render_demo(int size, std::uint32_t seed) {
-  return synthesis::render(furnished_room(), demo_rig(size), seed);
+  return render_demo_from(Eigen::Isometry3d::Identity(), size, seed);
+}
+
+RenderedPair render_demo_from(const Eigen::Isometry3d& world_from_rig, int size,
+                              std::uint32_t seed) {
+  const Rig rig = demo_rig(size);
+  Rig moved = rig;
+  for (View& view : moved.views) view.world_from_camera = world_from_rig * view.world_from_camera;
+  RenderedPair pair = synthesis::render(furnished_room(), moved, seed);
+  pair.rig = rig;
+  return pair;
 }
 
 RenderedPair render_plane(const Rig& rig, const Eigen::Vector3d& normal, double offset,

@@ -137,11 +137,14 @@ TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
   for (Dispatch& dispatch : other.dispatches) ++dispatch.pass.seed;
   backend->run(other, {});
   EXPECT_GT(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  EXPECT_EQ(emulation().graphs_made, 2);
   other = schedule;
   other.parameters.range.z *= 2;
   backend->run(other, {});
   EXPECT_EQ(emulation().graphs_made, 3);
+  EXPECT_GT(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
   backend->run(schedule, {});
+  EXPECT_EQ(emulation().graphs_made, 3) << "other parameters need no other graph";
   EXPECT_EQ(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
   other.constants.window_radius = 4;
   EXPECT_THROW(backend->run(other, {}), Error);

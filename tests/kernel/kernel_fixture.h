@@ -64,6 +64,7 @@ class KernelFixture {
       views_[i].intensities.setTo(-1, usable == 0);
       views_[i].hypotheses = cv::Mat::zeros(size, CV_32FC4);
       views_[i].checks = cv::Mat::zeros(size, CV_32FC4);
+      views_[i].priors = cv::Mat::zeros(size, CV_32FC4);
       largest = {std::max(largest.width, size.width), std::max(largest.height, size.height)};
     }
     nearest_.create(largest);

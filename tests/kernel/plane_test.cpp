@@ -151,6 +151,65 @@ TEST(Transfer, CarriesAPlaneIntoTheOtherView) {
   EXPECT_GT(carried, 0.99 * central);
 }
 
+TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
+  Options options = Options::preset_named("fast");
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  const Rig rig = fisheye_rig(96);
+  KernelFixture fixture(rig, options);
+  const Eigen::Isometry3d now_from_previous =
+      Eigen::Translation3d(0.05, -0.02, 0.1) *
+      Eigen::AngleAxisd(0.06, Eigen::Vector3d(0.3, 1, 0.2).normalized());
+  set_motion(fixture.schedule(), rig, now_from_previous, 7);
+  // The plane {X : n . X = d} of the rig's frame, seen by camera 1, whose frame is another one.
+  const Eigen::Vector3d n = Eigen::Vector3d(0.1, 0.15, 1).normalized();
+  const auto in_camera = [&](const Eigen::Isometry3d& previous_from_camera) {
+    const double d = 1.7 - n.dot(previous_from_camera.translation());
+    return Eigen::Vector3d(previous_from_camera.linear().transpose() * n / d);
+  };
+  const Eigen::Isometry3d& rig_from_camera = rig.views[1].world_from_camera;
+  const Eigen::Vector3d held = in_camera(rig_from_camera);
+  const Eigen::Vector3d expected = in_camera(now_from_previous.inverse() * rig_from_camera);
+  const vec3 mk = to_kernel(held);
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const cv::Vec4f ray = fixture.view(1).rays(y, x);
+      const double w = held.dot(Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>());
+      const bool seen = w > 0.02 && !(x >= 40 && x < 52 && y >= 40 && y < 52);
+      fixture.view(1).hypotheses(y, x) =
+          seen ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
+    }
+  }
+  fixture.set_reference(1);
+  fixture.pass().other = 1;
+  const auto context = fixture.context();
+  const auto run = [&](auto function) {
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) function(context, ivec2(x, y));
+    }
+  };
+  const auto carried_in = [&](const cv::Mat_<cv::Vec4f>& map) {
+    int carried = 0;
+    for (int y = 20; y < 76; ++y) {
+      for (int x = 20; x < 76; ++x) {
+        const cv::Vec4f h = map(y, x);
+        carried += (Eigen::Vector3f(h[0], h[1], h[2]).cast<double>() - expected).norm() < 1e-5;
+      }
+    }
+    return carried / (56.0 * 56.0);
+  };
+  run(kernel::cpu::transfer_clear_pixel);
+  run(kernel::cpu::transfer_nearest_pixel);
+  run(kernel::cpu::transfer_winner_pixel);
+  run(kernel::cpu::transfer_keep_pixel);
+  EXPECT_EQ(fixture.view(1).hypotheses(30, 30)[0], mk.x) << "still read by other pixels";
+  const double hole = 12.0 * 12 / (56 * 56);
+  EXPECT_GT(carried_in(fixture.view(1).priors), 0.97 - hole);
+  EXPECT_LT(carried_in(fixture.view(1).priors), 1 - 0.5 * hole) << "what had no plane has none now";
+  run(kernel::cpu::renew_pixel);
+  EXPECT_GT(carried_in(fixture.view(1).hypotheses), 0.99) << "surfaces continue into holes";
+}
+
 TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
   Options options;
   options.min_distance = 0.2;

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/sequence.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <fstream>
+#include <map>
+
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t digits_of_nanoseconds = 16;
+
+bool is_image(const fs::path& path) {
+  static constexpr std::array<const char*, 9> extensions = {
+      ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"};
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+}
+
+bool is_number(const std::string& text) {
+  return !text.empty() &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// Numbers in their order, before all other names.
+struct InOrder {
+  bool operator()(const std::string& a, const std::string& b) const {
+    if (is_number(a) != is_number(b)) return is_number(a);
+    if (!is_number(a)) return a < b;
+    const std::string_view x = significant(a);
+    const std::string_view y = significant(b);
+    if (x.size() != y.size()) return x.size() < y.size();
+    return x != y ? x < y : a < b;  // 7 and 007 are two names
+  }
+  static std::string_view significant(const std::string& number) {
+    return std::string_view(number).substr(std::min(number.find_first_not_of('0'), number.size()));
+  }
+};
+
+/// Images of one camera by what frames are matched by: names, or nanoseconds.
+using Images = std::map<std::string, fs::path, InOrder>;
+
+Images images_in(const fs::path& folder) {
+  Images images;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_regular_file(error) && is_image(entry.path())) {
+      const auto [place, is_new] = images.emplace(entry.path().stem().string(), entry.path());
+      if (!is_new) {
+        throw Error("The frame " + place->first + " has two images, " + place->second.string() +
+                    " and " + entry.path().filename().string() + "; leave one.");
+      }
+    }
+  }
+  if (error)
+    throw Error("Cannot read the folder " + folder.string() + ": " + error.message() + ".");
+  if (images.empty()) {
+    throw Error("There are no images in " + folder.string() + "; check the path.");
+  }
+  return images;
+}
+
+Images images_listed_in(const fs::path& list) {
+  std::ifstream file(list);
+  Images images;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    if (line.empty() || line[0] == '#') continue;
+    const std::size_t comma = line.find(',');
+    const std::string time = line.substr(0, comma);
+    const std::size_t start =
+        comma == std::string::npos ? comma : line.find_first_not_of(' ', comma + 1);
+    if (!is_number(time) || time.size() > 19 || start == std::string::npos) {
+      throw Error(list.string() + " line " + std::to_string(number) +
+                  " is no \"nanoseconds,filename\".");
+    }
+    images.emplace(time, list.parent_path() / "data" / line.substr(start));
+  }
+  if (images.empty()) throw Error(list.string() + " lists no images.");
+  return images;
+}
+
+/// Images of camN in either layout.
+Images images_of(const fs::path& folder, int camera) {
+  const std::string name = "cam" + std::to_string(camera);
+  for (const fs::path& base : {folder / "mav0" / name, folder / name}) {
+    if (fs::is_regular_file(base / "data.csv")) return images_listed_in(base / "data.csv");
+    if (fs::is_directory(base / "data")) return images_in(base / "data");
+    if (fs::is_directory(base)) return images_in(base);
+  }
+  throw Error("There is no folder " + (folder / name).string() +
+              "; a data set has images in cam0, cam1, ... or in mav0/cam0/data, mav0/cam1/data, "
+              "...");
+}
+
+std::optional<std::int64_t> nanoseconds_of(const std::string& name) {
+  if (!is_number(name) || name.size() < digits_of_nanoseconds) return std::nullopt;
+  std::int64_t value = 0;
+  const auto result = std::from_chars(name.data(), name.data() + name.size(), value);
+  if (result.ec != std::errc()) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
+                                         bool skip_incomplete) {
+  if (!fs::is_directory(folder)) {
+    throw Error("There is no folder " + folder.string() + "; check the path.");
+  }
+  std::vector<Images> images;
+  for (const int camera : cameras) images.push_back(images_of(folder, camera));
+  std::map<std::string, int, InOrder> counts;
+  for (const Images& of_camera : images) {
+    for (const auto& [key, path] : of_camera) ++counts[key];
+  }
+  std::vector<SequenceFrame> frames;
+  for (const auto& [key, count] : counts) {
+    SequenceFrame frame;
+    frame.nanoseconds = nanoseconds_of(key);
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      const auto found = images[i].find(key);
+      if (found != images[i].end()) {
+        frame.images.push_back(found->second);
+      } else if (!skip_incomplete) {
+        throw Error("The frame " + key + " has no image of cam" + std::to_string(cameras[i]) +
+                    " in " + folder.string() + " (" + std::to_string(images[i].size()) + " of " +
+                    std::to_string(counts.size()) +
+                    " frames have one); add it, or leave such frames out (--skip-incomplete).");
+      }
+    }
+    if (frame.images.size() != cameras.size()) continue;
+    frame.name = frame.images.front().stem().string();
+    frames.push_back(std::move(frame));
+  }
+  if (frames.empty()) {
+    throw Error("No frame of " + folder.string() +
+                " has images of all cameras; images of one frame must have equal names or times.");
+  }
+  return frames;
+}
+
+}  // namespace widestereo

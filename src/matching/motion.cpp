@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/motion.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+/// Blur of both frames (pixels), coarse to fine: about twice that displacement is bridged.
+constexpr std::array<double, 4> blurs = {8, 4, 2, 1};
+constexpr int most_steps = 12;      // of each blur
+constexpr double last_step = 1e-6;  // radians, metres
+constexpr double points_per_view = 3000;
+constexpr std::size_t fewest_points = 200;
+/// Standard deviation to which every direction of motion must be determined: radians, and metres
+/// per metre of the median distance.
+constexpr double largest_uncertainty = 0.003;
+
+/// A point of the previous frame.
+struct Point {
+  Eigen::Vector3d position;  ///< rig's frame
+  cv::Point pixel;           ///< of its own view
+};
+
+/// One view at one blur.
+struct BlurredView {
+  cv::Mat_<float> previous;
+  cv::Mat_<cv::Vec3f> now;  ///< intensity and its derivatives by x and y
+  cv::Mat_<uchar> usable;   ///< 0: what lies outside the lens has been blurred into the pixel
+};
+
+struct Normals {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd gradient;
+  double cost = 0;      ///< mean robust cost per point
+  double variance = 0;  ///< of the residuals, robust
+  std::size_t points = 0;
+};
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+cv::Vec3f bilinear(const cv::Mat_<cv::Vec3f>& image, const Eigen::Vector2d& at) {
+  const int x = static_cast<int>(at.x());
+  const int y = static_cast<int>(at.y());
+  const auto fx = static_cast<float>(at.x() - x);
+  const auto fy = static_cast<float>(at.y() - y);
+  return (1 - fy) * ((1 - fx) * image(y, x) + fx * image(y, x + 1)) +
+         fy * ((1 - fx) * image(y + 1, x) + fx * image(y + 1, x + 1));
+}
+
+/// Accepted points on a regular grid, in the rig's frame.
+std::vector<Point> accepted_points(const View& view, const cv::Mat& rays,
+                                   const ViewResult& matched) {
+  std::vector<Point> points;
+  const double pixels = static_cast<double>(matched.hypotheses.total());
+  const int step = std::max(1, static_cast<int>(std::sqrt(pixels / points_per_view)));
+  for (int y = step / 2; y < matched.hypotheses.rows; y += step) {
+    for (int x = step / 2; x < matched.hypotheses.cols; x += step) {
+      if (matched.reasons.at<std::uint16_t>(y, x) != 0) continue;
+      const auto& plane = matched.hypotheses.at<cv::Vec4f>(y, x);
+      const auto& r = rays.at<cv::Vec4f>(y, x);
+      const Eigen::Vector3d ray = Eigen::Vector3f(r[0], r[1], r[2]).cast<double>();
+      const double w = Eigen::Vector3f(plane[0], plane[1], plane[2]).cast<double>().dot(ray);
+      if (w > 0) points.push_back({view.world_from_camera * (ray / w), {x, y}});
+    }
+  }
+  return points;
+}
+
+BlurredView blurred(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& usable,
+                    double sigma) {
+  BlurredView view;
+  cv::GaussianBlur(previous, view.previous, {}, sigma);
+  cv::Mat smooth;
+  cv::Mat dx;
+  cv::Mat dy;
+  cv::GaussianBlur(now, smooth, {}, sigma);
+  cv::Sobel(smooth, dx, CV_32F, 1, 0, 3, 0.125);
+  cv::Sobel(smooth, dy, CV_32F, 0, 1, 3, 0.125);
+  cv::merge(std::vector<cv::Mat>{smooth, dx, dy}, view.now);
+  const int reach = 2 * static_cast<int>(std::ceil(sigma)) + 1;
+  cv::erode(usable, view.usable,
+            cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, cv::Scalar(255));
+  return view;
+}
+
+/// Aligns the points of all views; unknowns: turn and shift of the rig, then gain and offset of
+/// each view.
+class Alignment {
+ public:
+  Alignment(const Rig& rig, std::vector<std::vector<Point>> points)
+      : rig_(rig), points_(std::move(points)), brightness_(rig.views.size(), {1, 0}) {}
+
+  void refine(const std::vector<BlurredView>& views) {
+    Normals normals = linearise(views);
+    for (int step = 0; step < most_steps && normals.points >= fewest_points; ++step) {
+      const Eigen::VectorXd update = solve(normals);
+      if (!update.allFinite()) return;
+      const auto before = std::pair(motion_, brightness_);
+      apply(update);
+      const Normals next = linearise(views);
+      if (next.points < fewest_points || next.cost > normals.cost * (1 + 1e-3)) {
+        std::tie(motion_, brightness_) = before;
+        return;
+      }
+      normals = next;
+      if (update.head<6>().norm() < last_step) return;
+    }
+  }
+
+  /// Whether every direction of motion is determined.
+  bool is_determined(const std::vector<BlurredView>& views) {
+    const Normals normals = linearise(views);
+    if (normals.points < fewest_points) return false;
+    const Eigen::Index others = normals.information.rows() - 6;
+    Eigen::MatrixXd brightness = normals.information.bottomRightCorner(others, others);
+    brightness.diagonal().array() += 1e-9;
+    const Eigen::MatrixXd shared = normals.information.topRightCorner(6, others);
+    Eigen::Matrix<double, 6, 6> of_motion = normals.information.topLeftCorner<6, 6>() -
+                                            shared * brightness.ldlt().solve(shared.transpose());
+    Eigen::Matrix<double, 6, 1> units;
+    units << 1, 1, 1, Eigen::Vector3d::Constant(median_distance());
+    of_motion = units.asDiagonal() * of_motion * units.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(of_motion);
+    const double weakest = solver.eigenvalues().minCoeff();
+    return normals.variance < weakest * largest_uncertainty * largest_uncertainty;
+  }
+
+  const Eigen::Isometry3d& motion() const { return motion_; }
+
+ private:
+  struct Row {
+    double residual;
+    Eigen::Matrix<double, 1, 6> by_motion;
+    double intensity;  ///< of the previous frame: derivative by the gain
+    std::size_t view;
+  };
+
+  double median_distance() const {
+    std::vector<double> distances;
+    for (const std::vector<Point>& of_view : points_) {
+      for (const Point& point : of_view) distances.push_back(point.position.norm());
+    }
+    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+    std::nth_element(distances.begin(), middle, distances.end());
+    return *middle;
+  }
+
+  std::vector<Row> rows(const std::vector<BlurredView>& views) const {
+    std::vector<Row> rows;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const BlurredView& view = views[i];
+      const Eigen::Isometry3d camera_from_rig = rig_.views[i].world_from_camera.inverse();
+      for (const Point& point : points_[i]) {
+        if (view.usable(point.pixel) == 0) continue;
+        const Eigen::Vector3d moved = motion_ * point.position;
+        Eigen::Vector2d pixel;
+        Eigen::Matrix<double, 2, 3> jacobian;
+        if (!project(rig_.views[i].camera, camera_from_rig * moved, pixel, jacobian)) continue;
+        if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < view.now.cols - 1 &&
+              pixel.y() < view.now.rows - 1) ||
+            view.usable(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5)) ==
+                0) {
+          continue;
+        }
+        const cv::Vec3f seen = bilinear(view.now, pixel);
+        const double intensity = static_cast<double>(view.previous(point.pixel));
+        const Eigen::RowVector3d by_point = Eigen::RowVector2f(seen[1], seen[2]).cast<double>() *
+                                            jacobian * camera_from_rig.linear();
+        Row& row = rows.emplace_back();
+        row.residual =
+            static_cast<double>(seen[0]) - brightness_[i][0] * intensity - brightness_[i][1];
+        row.by_motion << -by_point * cross_matrix(moved), by_point;
+        row.intensity = intensity;
+        row.view = i;
+      }
+    }
+    return rows;
+  }
+
+  Normals linearise(const std::vector<BlurredView>& views) const {
+    const std::vector<Row> all = rows(views);
+    const Eigen::Index unknowns = 6 + 2 * static_cast<Eigen::Index>(views.size());
+    Normals normals;
+    normals.points = all.size();
+    normals.information = Eigen::MatrixXd::Zero(unknowns, unknowns);
+    normals.gradient = Eigen::VectorXd::Zero(unknowns);
+    if (all.empty()) return normals;
+    std::vector<double> sizes;
+    for (const Row& row : all) sizes.push_back(std::abs(row.residual));
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    const double scale = 1.4826 * *middle + 1e-4;
+    normals.variance = scale * scale;
+    for (const Row& row : all) {
+      // Geman and McClure's weight: what moves by itself or was occluded counts for little.
+      const double doubt = 1 + row.residual * row.residual / (4 * scale * scale);
+      const double weight = 1 / (doubt * doubt);
+      Eigen::Matrix<double, 8, 1> by;
+      by << row.by_motion.transpose(), -row.intensity, -1;
+      const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(row.view);
+      normals.information.topLeftCorner<6, 6>() += weight * by.head<6>() * by.head<6>().transpose();
+      normals.information.block<6, 2>(0, place) += weight * by.head<6>() * by.tail<2>().transpose();
+      normals.information.block<2, 2>(place, place) +=
+          weight * by.tail<2>() * by.tail<2>().transpose();
+      normals.gradient.head<6>() += weight * row.residual * by.head<6>();
+      normals.gradient.segment<2>(place) += weight * row.residual * by.tail<2>();
+      normals.cost += row.residual * row.residual / doubt;
+    }
+    normals.cost /= static_cast<double>(all.size());
+    normals.information.triangularView<Eigen::StrictlyLower>() =
+        normals.information.transpose().triangularView<Eigen::StrictlyLower>();
+    return normals;
+  }
+
+  static Eigen::VectorXd solve(const Normals& normals) {
+    Eigen::MatrixXd damped = normals.information;
+    damped.diagonal() *= 1 + 1e-6;
+    damped.diagonal().array() += 1e-9;
+    return -damped.ldlt().solve(normals.gradient);
+  }
+
+  void apply(const Eigen::VectorXd& update) {
+    const Eigen::Vector3d turn = update.head<3>();
+    const double angle = turn.norm();
+    Eigen::Isometry3d step = Eigen::Isometry3d::Identity();
+    if (angle > 0) step.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+    step.translation() = update.segment<3>(3);
+    motion_ = step * motion_;
+    for (std::size_t i = 0; i < brightness_.size(); ++i) {
+      const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);
+      brightness_[i] += update.segment<2>(place);
+    }
+  }
+
+  const Rig& rig_;
+  std::vector<std::vector<Point>> points_;
+  Eigen::Isometry3d motion_ = Eigen::Isometry3d::Identity();
+  std::vector<Eigen::Vector2d> brightness_;
+};
+
+void require_sizes(const Rig& rig, const std::vector<cv::Mat>& previous_images,
+                   const std::vector<ViewResult>& previous, const std::vector<cv::Mat>& images) {
+  const std::size_t count = rig.views.size();
+  if (previous_images.size() != count || previous.size() != count || images.size() != count) {
+    throw Error("The rig has " + std::to_string(count) +
+                " views; its motion needs that many images of both frames, and results.");
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const cv::Size size(rig.views[i].camera.width, rig.views[i].camera.height);
+    for (const cv::Mat* map :
+         {&previous_images[i], &images[i], &previous[i].hypotheses, &previous[i].reasons}) {
+      if (map->size() == size) continue;
+      throw Error("The motion of " + rig.views[i].name + " needs images and results of " +
+                  std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels.");
+    }
+    if (previous[i].hypotheses.type() != CV_32FC4 || previous[i].reasons.type() != CV_16UC1) {
+      throw Error("The motion of " + rig.views[i].name +
+                  " needs hypotheses and reasons as the matcher returns them.");
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<Eigen::Isometry3d> estimate_motion(const Rig& rig,
+                                                 const std::vector<cv::Mat>& previous_images,
+                                                 const std::vector<ViewResult>& previous,
+                                                 const std::vector<cv::Mat>& images) {
+  require_sizes(rig, previous_images, previous, images);
+  std::vector<std::vector<Point>> points;
+  std::vector<cv::Mat> usable;
+  std::vector<std::array<cv::Mat, 2>> intensities;
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    const View& view = rig.views[i];
+    const cv::Mat rays = ray_image(view.camera, view.mask);
+    cv::Mat valid;
+    cv::extractChannel(rays, valid, 3);
+    usable.push_back(valid > 0);
+    points.push_back(accepted_points(view, rays, previous[i]));
+    intensities.push_back({to_intensity(previous_images[i], "The previous image of " + view.name),
+                           to_intensity(images[i], "The image of " + view.name)});
+  }
+  Alignment alignment(rig, std::move(points));
+  std::vector<BlurredView> views(rig.views.size());
+  for (const double blur : blurs) {
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      views[i] = blurred(intensities[i][0], intensities[i][1], usable[i], blur);
+    }
+    alignment.refine(views);
+  }
+  if (!alignment.is_determined(views)) return std::nullopt;
+  return alignment.motion();
+}
+
+}  // namespace widestereo

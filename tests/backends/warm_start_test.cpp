@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+// Frames of a moving rig, each started from the one before: as accurate as by themselves, at a
+// fraction of the work, on every back end.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "device_fixture.h"
+#include "error_of.h"
+#include "widestereo/matcher.h"
+#include "widestereo/motion.h"
+#include "widestereo/synthesis.h"
+
+namespace widestereo::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr int size = 96;
+
+/// Camera 0 to world of frame `k`: a step of 5 cm and two degrees each.
+Eigen::Isometry3d pose(int k) {
+  return Eigen::Translation3d(0.05 * k, -0.01 * k, 0.02 * k) *
+         Eigen::AngleAxisd(0.035 * k, Eigen::Vector3d(0.2, 1, 0.1).normalized());
+}
+
+Eigen::Isometry3d motion_to(int k) { return pose(k).inverse() * pose(k - 1); }
+
+/// The demo scene as frame `k` sees it; rendered once.
+const RenderedPair& frame(int k) {
+  static std::vector<std::optional<RenderedPair>> frames(3);
+  auto& rendered = frames.at(static_cast<std::size_t>(k));
+  if (!rendered) rendered = render_demo_from(pose(k), size);
+  return *rendered;
+}
+
+std::vector<cv::Mat> images_of(const RenderedPair& pair) {
+  return {pair.views[0].image, pair.views[1].image};
+}
+
+Options options_of(const std::string& preset) {
+  Options options = Options::preset_named(preset);
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  options.regression_radius = 12;  // in proportion to the image
+  return options;
+}
+
+RegionScores scores_of(const StereoResult& result, const RenderedPair& truth) {
+  return evaluate(result.views[0].distance, result.views[0].normals, truth.views[0].truth,
+                  truth.rig.views[0], truth.rig.views[1])[1];
+}
+
+bool same_bits(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
+
+class WarmStarts : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(WarmStarts, ReachColdAccuracyWithAQuarterOfTheWork) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const Options options = options_of("fast");
+  Matcher warm(*device, frame(0).rig, options);
+  Matcher alone(*device, frame(0).rig, options);
+  warm.match(images_of(frame(0)));
+  for (int k = 1; k < 3; ++k) {
+    const StereoResult result =
+        warm.match_next(images_of(frame(k)), {.now_from_previous = motion_to(k), .frame = k});
+    const StereoResult cold = alone.match(images_of(frame(k)));
+    EXPECT_LE(4 * result.samples, cold.samples);
+    const RegionScores scores = scores_of(result, frame(k));
+    const RegionScores expected = scores_of(cold, frame(k));
+    EXPECT_LT(scores.bad_relative.at(0.02), expected.bad_relative.at(0.02) + 0.02) << k;
+    EXPECT_LT(scores.bad_pixels.at(1.0), expected.bad_pixels.at(1.0) + 0.02) << k;
+  }
+  expect_no_validation_messages(*device);
+}
+
+TEST_P(WarmStarts, FromPlanesGivenOrStillOnTheDeviceHaveTheSameBits) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  for (const char* preset : {"fast", "paper"}) {
+    SCOPED_TRACE(preset);
+    Options options = options_of(preset);
+    options.window_radius = 2;
+    options.first_iterations = 2;
+    options.second_iterations = 1;
+    options.warm_iterations = 1;
+    Matcher matcher(*device, frame(0).rig, options);
+    const StereoResult first = matcher.match(images_of(frame(0)));
+    WarmStart start{.now_from_previous = motion_to(1)};
+    const StereoResult held = matcher.match_next(images_of(frame(1)), start);
+    for (const ViewResult& view : first.views) start.hypotheses.push_back(view.hypotheses);
+    Matcher other(*device, frame(0).rig, options);
+    const StereoResult given = other.match_next(images_of(frame(1)), start);
+    EXPECT_TRUE(same_bits(held.views[0].hypotheses, given.views[0].hypotheses));
+    EXPECT_TRUE(same_bits(held.views[1].hypotheses, given.views[1].hypotheses));
+    start.frame = 2;
+    const StereoResult redrawn = other.match_next(images_of(frame(1)), start);
+    EXPECT_FALSE(same_bits(given.views[0].hypotheses, redrawn.views[0].hypotheses));
+    // Cold frames do not depend on what was matched before.
+    EXPECT_TRUE(same_bits(matcher.match(images_of(frame(0))).views[1].hypotheses,
+                          first.views[1].hypotheses));
+  }
+  expect_no_validation_messages(*device);
+}
+
+TEST_P(WarmStarts, NeedPlanesThatFit) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Matcher matcher(*device, frame(0).rig, options_of("fast"));
+  EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), {}); }),
+              HasSubstr("no planes of a previous frame"));
+  WarmStart start;
+  start.hypotheses.resize(1);
+  EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), start); }),
+              HasSubstr("planes of 1"));
+  start.hypotheses.assign(2, cv::Mat::zeros(3, 4, CV_32FC4));
+  EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), start); }),
+              HasSubstr("cam0 from are 4x3"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, WarmStarts, ::testing::Values("cpu", "vulkan", "cuda"),
+                         [](const auto& test) { return std::string(test.param); });
+
+/// What a perfect match of frame 0 would have found.
+std::vector<ViewResult> true_planes(const RenderedPair& pair) {
+  std::vector<ViewResult> views(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const cv::Mat_<float> distance = pair.views[i].truth.distance;
+    const cv::Mat_<cv::Vec3f> normals = pair.views[i].truth.normals;
+    const cv::Mat_<cv::Vec4f> rays = ray_image(pair.rig.views[i].camera, {});
+    views[i].hypotheses = cv::Mat(distance.size(), CV_32FC4, cv::Scalar(0, 0, 0, 2));
+    cv::Mat(distance == 0).convertTo(views[i].reasons, CV_16U);
+    for (int y = 0; y < distance.rows; ++y) {
+      for (int x = 0; x < distance.cols; ++x) {
+        if (distance(y, x) == 0) continue;
+        const cv::Vec3f n = normals(y, x);
+        const cv::Vec4f r = rays(y, x);
+        const float scale = 1 / (distance(y, x) * n.dot({r[0], r[1], r[2]}));
+        views[i].hypotheses.at<cv::Vec4f>(y, x) = {scale * n[0], scale * n[1], scale * n[2], 0.1f};
+      }
+    }
+  }
+  return views;
+}
+
+TEST(Motion, IsFoundToAFractionOfAPixel) {
+  std::vector<cv::Mat> brighter = images_of(frame(1));
+  for (cv::Mat& image : brighter) image.convertTo(image, -1, 0.8, 12);
+  for (const auto& images : {images_of(frame(1)), brighter}) {
+    const auto motion =
+        estimate_motion(frame(0).rig, images_of(frame(0)), true_planes(frame(0)), images);
+    ASSERT_TRUE(motion.has_value());
+    const Eigen::Isometry3d error = motion_to(1).inverse() * *motion;
+    EXPECT_LT(Eigen::AngleAxisd(error.linear()).angle(), 0.003);  // a pixel has 0.03
+    EXPECT_LT(error.translation().norm(), 0.005);
+  }
+}
+
+TEST(Motion, IsNotInventedWhereNothingShowsIt) {
+  const std::vector<cv::Mat> grey(2, cv::Mat(size, size, CV_8UC1, cv::Scalar(90)));
+  EXPECT_FALSE(estimate_motion(frame(0).rig, grey, true_planes(frame(0)), grey).has_value());
+  std::vector<ViewResult> nothing = true_planes(frame(0));
+  for (ViewResult& view : nothing) view.reasons.setTo(reason_inconsistent);
+  EXPECT_FALSE(
+      estimate_motion(frame(0).rig, images_of(frame(0)), nothing, images_of(frame(1))).has_value());
+  EXPECT_THAT(error_of([&] {
+                estimate_motion(frame(0).rig, {grey[0], grey[1](cv::Rect(0, 0, 9, 9))},
+                                true_planes(frame(0)), grey);
+              }),
+              HasSubstr("cam1"));
+}
+
+}  // namespace
+}  // namespace widestereo::test

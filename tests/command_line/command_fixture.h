@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// Runs the command as a user does.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "temporary_folder.h"
+
+namespace widestereo::test {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output;  ///< standard output and error
+};
+
+inline Outcome run(const std::string& arguments, const std::string& environment = "") {
+  // Leaks of drivers are not the command's.
+  const std::string command = environment + " ASAN_OPTIONS=detect_leaks=0 " WIDESTEREO_COMMAND " " +
+                              arguments + " 2>&1 < /dev/null";
+  Outcome outcome;
+  FILE* pipe = popen(command.c_str(), "r");
+  if (pipe == nullptr) return outcome;
+  std::array<char, 4096> buffer{};
+  std::size_t count = 0;
+  while ((count = fread(buffer.data(), 1, buffer.size(), pipe)) > 0) {
+    outcome.output.append(buffer.data(), count);
+  }
+  const int status = pclose(pipe);
+  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  return outcome;
+}
+
+/// A rendered pair with its calibration, and options that make matching quick.
+class Command : public ::testing::Test {
+ protected:
+  static constexpr const char* quick =
+      " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2"
+      " --min-distance 0.4 --max-distance 8 ";
+
+  void SetUp() override {
+    const std::string calibration = R"(cam0:
+  camera_model: ds
+  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [96, 96]
+  max_theta_deg: 97.5
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.1]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: ds
+  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [96, 96]
+)";
+    folder_.write("calib.yaml", calibration);
+    cv::Mat noise(96, 96, CV_8UC3);
+    cv::theRNG().state = 3;
+    cv::randu(noise, 0, 255);
+    cv::imwrite(file("left.png"), noise);
+    cv::imwrite(file("right.png"), noise);
+  }
+
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string depth_of(const std::string& left, const std::string& right,
+                       const std::string& calibration = "calib.yaml") const {
+    return "depth " + file(left) + " " + file(right) + " -c " + file(calibration) + " -o " +
+           file("out") + quick;
+  }
+  /// Fails, with a message that has `part`, exit code 1 and no map written.
+  void expect_error(const std::string& arguments, const std::string& part) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find("widestereo: "), std::string::npos) << outcome.output;
+    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
+    EXPECT_FALSE(fs::exists(folder_ / "out/result.json"));
+    EXPECT_FALSE(fs::exists(folder_ / "out/distance0.tiff"));
+  }
+
+  TemporaryFolder folder_;
+};
+
+}  // namespace widestereo::test

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+// `widestereo sequence` as a user meets it: layouts, resuming, scene cuts, messages.
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "command_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Three frames of noise that moves to the left, 4 pixels apart in the two cameras.
+class SequenceCommand : public Command {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    for (int k = 0; k < 3; ++k) add_frame(k, "00" + std::to_string(k), 3);
+  }
+
+  void add_frame(int k, const std::string& name, int seed) const {
+    cv::Mat noise(96, 130, CV_8UC1);
+    cv::RNG(seed).fill(noise, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(noise, noise, {}, 1.2);
+    for (int camera = 0; camera < 2; ++camera) {
+      const fs::path folder = folder_ / ("data/cam" + std::to_string(camera));
+      fs::create_directories(folder);
+      cv::imwrite((folder / (name + ".png")).string(),
+                  noise(cv::Rect(2 * k + 4 * camera, 0, 96, 96)));
+    }
+  }
+
+  std::string sequence(const std::string& output = "out", const std::string& data = "data") const {
+    return "sequence " + file(data) + " -c " + file("calib.yaml") + " -o " + file(output) + quick +
+           "--warm-iterations 1 ";
+  }
+  nlohmann::json record(const std::string& output = "out") const {
+    return nlohmann::json::parse(bytes_of(folder_ / output / "sequence.json"));
+  }
+  void expect_same_results(const std::string& a, const std::string& b) const {
+    for (const char* frame : {"000", "001", "002"}) {
+      for (const auto& entry : fs::directory_iterator(folder_ / a / frame)) {
+        if (entry.path().extension() == ".json") continue;
+        EXPECT_TRUE(bytes_of(entry.path()) ==
+                    bytes_of(folder_ / b / frame / entry.path().filename()))
+            << entry.path();
+      }
+    }
+  }
+};
+
+TEST_F(SequenceCommand, StartsEachFrameFromTheOneBefore) {
+  const Outcome outcome = run(sequence() + "--restart-below 0");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("(3 of 3)"), std::string::npos) << outcome.output;
+  const nlohmann::json frames = record()["frames"];
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0]["start"], "cold");
+  EXPECT_EQ(frames[1]["start"], "warm");
+  EXPECT_EQ(frames[2]["name"], "002");
+  EXPECT_TRUE(fs::exists(folder_ / "out/001/distance1.tiff"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/001/cloud0.ply")) << "not unless asked for";
+  EXPECT_FALSE(fs::exists(folder_ / "out/001/planes0.tiff")) << "kept for the last frame only";
+  EXPECT_TRUE(fs::exists(folder_ / "out/002/planes0.tiff"));
+}
+
+TEST_F(SequenceCommand, ResumesWithTheSameBits) {
+  const std::string options = "--restart-below 0 ";
+  ASSERT_EQ(run(sequence("whole") + options).exit_code, 0);
+  ASSERT_EQ(run(sequence("parts") + options + "--count 2").exit_code, 0);
+  fs::create_directories(folder_ / "parts/.unfinished");
+  const Outcome rest = run(sequence("parts") + options + "--json");
+  ASSERT_EQ(rest.exit_code, 0) << rest.output;
+  EXPECT_EQ(nlohmann::json::parse(rest.output)["frames"].size(), 3u);
+  EXPECT_FALSE(fs::exists(folder_ / "parts/.unfinished"));
+  expect_same_results("whole", "parts");
+  const Outcome again = run(sequence("parts") + options);
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_EQ(again.output.find("of 3)"), std::string::npos) << "nothing is left to do";
+  fs::remove_all(folder_ / "parts/001");
+  ASSERT_EQ(run(sequence("parts") + options).exit_code, 0) << "a lost frame is matched again";
+  EXPECT_TRUE(fs::exists(folder_ / "parts/001/result.json"));
+}
+
+TEST_F(SequenceCommand, OtherSettingsNeedAnotherFolderOrOverwriting) {
+  ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
+  const Outcome other = run(sequence() + "--seed 5");
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_NE(other.output.find("options/seed is 1 there and 5 now"), std::string::npos)
+      << other.output;
+  EXPECT_NE(other.output.find("--overwrite"), std::string::npos);
+  EXPECT_EQ(record()["frames"].size(), 1u);
+  ASSERT_EQ(run(sequence() + "--seed 5 --overwrite --count 2").exit_code, 0);
+  EXPECT_EQ(record()["frames"].size(), 2u);
+  EXPECT_EQ(record()["settings"]["options"]["seed"], 5);
+  folder_.write("out/sequence.json", "{\"frames\": [{\"name\": \"../data\"}], \"settings\": {}}");
+  EXPECT_EQ(run(sequence() + "--overwrite").exit_code, 1);
+  EXPECT_TRUE(fs::exists(folder_ / "data/cam0/000.png"));
+}
+
+TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
+  add_frame(0, "001", 8);
+  const Outcome outcome = run(sequence() + "--restart-below 1 --count 2 --no-motion");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json frames = record()["frames"];
+  EXPECT_EQ(frames[1]["start"], "cold after warm") << frames.dump(1);
+  const Outcome alone = run(sequence("alone") + "--no-warm-start --count 2");
+  ASSERT_EQ(alone.exit_code, 0) << alone.output;
+  EXPECT_EQ(bytes_of(folder_ / "out/001/distance0.tiff"),
+            bytes_of(folder_ / "alone/001/distance0.tiff"));
+}
+
+TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
+  std::string poses = "# seconds\n";
+  for (int camera = 0; camera < 2; ++camera) {
+    const std::string name = "cam" + std::to_string(camera);
+    fs::create_directories(folder_ / "euroc/mav0" / name);
+    fs::rename(folder_ / "data" / name, folder_ / "euroc/mav0" / name / "data");
+    std::string list = "#timestamp [ns],filename\n";
+    for (int k = 0; k < 3; ++k) {
+      list += "1403636579" + std::to_string(k) + "00000000,00" + std::to_string(k) + ".png\n";
+      if (camera == 0) poses += "1403636579." + std::to_string(k) + "001 0.0 0 0 0 0 0 1\n";
+    }
+    folder_.write("euroc/mav0/" + name + "/data.csv", list);
+  }
+  folder_.write("poses.txt", poses);
+  const Outcome outcome = run(sequence("out", "euroc") + "--poses " + file("poses.txt") +
+                              " --first 1 --restart-below 0 --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json frames = nlohmann::json::parse(outcome.output)["frames"];
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0]["name"], "001");
+  EXPECT_EQ(frames[1]["motion"], "poses");
+}
+
+TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {
+  const auto expect = [&](const std::string& arguments, const std::string& part) {
+    expect_error(arguments, part);
+    EXPECT_FALSE(fs::exists(folder_ / "out/sequence.json")) << arguments;
+    EXPECT_FALSE(fs::exists(folder_ / "out/000")) << arguments;
+  };
+  expect(sequence("out", "nowhere"), "nowhere");
+  fs::create_directories(folder_ / "empty/cam0");
+  expect(sequence("out", "empty"), "no images");
+  expect(sequence() + "--first 3", "3 frames");
+  expect(sequence() + "--views 0,2", "cam2");
+  expect(sequence() + "--poses " + file("none.txt"), "none.txt");
+  folder_.write("few.txt", "1 0 0 0 0 0 0 1\n");
+  expect(sequence() + "--poses " + file("few.txt"), "1 poses for 3 frames");
+  folder_.write("nan.txt", "1 0 0 nan 0 0 0 1\n");
+  expect(sequence() + "--poses " + file("nan.txt"), "nan.txt line 1");
+  cv::imwrite(file("data/cam1/000.png"), cv::Mat(48, 96, CV_8UC1, cv::Scalar(7)));
+  expect(sequence(), "cam1/000.png is 96x48");
+  folder_.write("data/cam1/000.png", "garbage");
+  expect(sequence(), "cam1/000.png");
+  fs::remove(folder_ / "data/cam1/000.png");
+  expect(sequence(), "frame 000 has no image of cam1");
+}
+
+TEST_F(SequenceCommand, ABrokenFrameLeavesTheFramesBeforeIt) {
+  folder_.write("data/cam1/002.png", "garbage");
+  const Outcome outcome = run(sequence() + "--restart-below 0");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("cam1/002.png"), std::string::npos) << outcome.output;
+  EXPECT_EQ(record()["frames"].size(), 2u);
+  EXPECT_FALSE(fs::exists(folder_ / "out/002"));
+  add_frame(2, "002", 3);
+  EXPECT_EQ(run(sequence() + "--restart-below 0").exit_code, 0);
+  EXPECT_EQ(record()["frames"].size(), 3u);
+}
+
+}  // namespace
+}  // namespace widestereo::test

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+#include "rig_settings.h"
+
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "widestereo/calibration.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace ws = widestereo;
+
+void RigSettings::add_to(CLI::App& command) {
+  command
+      .add_option("-c,--calibration", calibration, "Kalibr camchain, Basalt JSON or OpenCV file")
+      ->required();
+  command.add_option("--views", views, "Cameras of the calibration, one for each image")
+      ->delimiter(',');
+  command.add_option("--mask", masks,
+                     "Image, 0 = ignore the pixel; once for all views or once for each");
+  command.add_option("--max-theta", max_theta, "Half angle of the lens's field of view, degrees")
+      ->check(CLI::Range(1.0, 180.0));
+}
+
+ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) const {
+  const ws::Rig all = ws::read_calibration(calibration, size).rig;
+  std::vector<int> chosen = views;
+  if (chosen.empty()) {
+    for (std::size_t i = 0; i < image_count; ++i) chosen.push_back(static_cast<int>(i));
+  }
+  if (chosen.size() != image_count) {
+    throw ws::Error("--views names " + std::to_string(chosen.size()) + " cameras for " +
+                    std::to_string(image_count) + " images; name one for each image.");
+  }
+  ws::Rig rig;
+  for (const int view : chosen) {
+    if (view < 0 || view >= static_cast<int>(all.views.size())) {
+      throw ws::Error(calibration + " has " + std::to_string(all.views.size()) +
+                      " camera(s); there is no camera " + std::to_string(view) +
+                      ". Give one image for each camera, or choose cameras with --views.");
+    }
+    rig.views.push_back(all.views[static_cast<std::size_t>(view)]);
+  }
+  if (masks.size() > 1 && masks.size() != image_count) {
+    throw ws::Error("--mask was given " + std::to_string(masks.size()) + " times for " +
+                    std::to_string(image_count) + " images; give one for all or one for each.");
+  }
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    ws::View& view = rig.views[i];
+    if (max_theta > 0) view.camera.max_theta = max_theta * std::numbers::pi / 180;
+    if (!masks.empty()) {
+      const std::string& file = masks[masks.size() == 1 ? 0 : i];
+      view.mask = ws::to_intensity(ws::read_image(file), file) > 0;
+    }
+  }
+  return rig;
+}

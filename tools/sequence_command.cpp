@@ -1,0 +1,413 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "match_settings.h"
+#include "matching_run.h"
+#include "progress_bar.h"
+#include "result_folder.h"
+#include "rig_settings.h"
+#include "sequence_folder.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+#include "widestereo/motion.h"
+#include "widestereo/sequence.h"
+
+namespace ws = widestereo;
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+struct SequenceArguments {
+  std::string dataset;
+  std::string output;
+  std::string poses;
+  double poses_tolerance = 0.01;  // seconds
+  int first = 0;
+  int count = 0;  // 0 = all
+  int step = 1;
+  double restart_below = 0.75;
+  bool no_motion = false;
+  bool no_warm_start = false;
+  bool skip_incomplete = false;
+  bool overwrite = false;
+  RigSettings rig;
+  MatchSettings settings;
+  FolderFormat format;
+  bool as_json = false;
+};
+
+/// Frames to match, with the rig's poses where they are known.
+struct Selection {
+  std::vector<ws::SequenceFrame> frames;
+  std::vector<Eigen::Isometry3d> poses;
+  std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const ws::SequenceFrame& frame : frames) names.push_back(frame.name);
+    return names;
+  }
+};
+
+Selection select_frames(const SequenceArguments& a) {
+  std::vector<int> cameras = a.rig.views;
+  if (cameras.empty()) cameras = {0, 1};
+  const auto frames = ws::read_sequence(a.dataset, cameras, a.skip_incomplete);
+  std::vector<Eigen::Isometry3d> poses;
+  if (!a.poses.empty()) {
+    poses = ws::poses_of_frames(frames, ws::read_trajectory(a.poses), a.poses_tolerance, a.poses);
+  }
+  if (a.first >= static_cast<int>(frames.size())) {
+    throw ws::Error(a.dataset + " has " + std::to_string(frames.size()) +
+                    " frames; there is no frame " + std::to_string(a.first) +
+                    " to start from (--first counts from 0).");
+  }
+  Selection selection;
+  for (std::size_t i = static_cast<std::size_t>(a.first); i < frames.size();
+       i += static_cast<std::size_t>(a.step)) {
+    if (a.count > 0 && selection.frames.size() == static_cast<std::size_t>(a.count)) break;
+    selection.frames.push_back(frames[i]);
+    if (!poses.empty()) selection.poses.push_back(poses[i]);
+  }
+  return selection;
+}
+
+std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
+  std::vector<cv::Mat> images;
+  for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
+  return images;
+}
+
+void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& images,
+                   const ws::Rig& rig) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const ws::Camera& camera = rig.views[i].camera;
+    if (images[i].cols == camera.width && images[i].rows == camera.height) continue;
+    throw ws::Error(frame.images[i].string() + " is " + std::to_string(images[i].cols) + "x" +
+                    std::to_string(images[i].rows) + " pixels, but the calibration of " +
+                    rig.views[i].name + " is for " + std::to_string(camera.width) + "x" +
+                    std::to_string(camera.height) + "; use images of the calibrated size.");
+  }
+}
+
+Json to_json(const ws::View& view) {
+  const ws::Camera& c = view.camera;
+  Json pose = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      pose.push_back(view.world_from_camera.matrix()(row, column));
+    }
+  }
+  return {{"name", view.name},
+          {"model", to_string(c.model)},
+          {"size", {c.width, c.height}},
+          {"intrinsics",
+           {c.fx, c.fy, c.cx, c.cy, c.skew, c.xi, c.alpha, c.beta, c.omega, c.k1, c.k2, c.k3, c.k4,
+            c.p1, c.p2}},
+          {"max_theta", c.max_theta},
+          {"world_from_camera", pose},
+          {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)}};
+}
+
+/// All that decides the results of a frame.
+Json settings_of(const SequenceArguments& a, const ws::Rig& rig, const ws::Options& options,
+                 const ws::DeviceInfo& device) {
+  const auto absolute = [](const std::string& path) {
+    return path.empty() ? path : fs::absolute(path).lexically_normal().string();
+  };
+  Json settings = {{"program", "widestereo " WIDESTEREO_VERSION},
+                   {"dataset", absolute(a.dataset)},
+                   {"calibration", absolute(a.rig.calibration)},
+                   {"masks", a.rig.masks},
+                   {"poses", absolute(a.poses)},
+                   {"poses_tolerance", a.poses_tolerance},
+                   {"first", a.first},
+                   {"step", a.step},
+                   {"warm_start", !a.no_warm_start},
+                   {"motion", !a.no_motion},
+                   {"restart_below", a.restart_below},
+                   {"formats", a.format.maps},
+                   {"png_scale", a.format.png_scale},
+                   {"clouds", !a.format.no_cloud},
+                   {"pictures", !a.format.no_pictures},
+                   {"device", device.name},
+                   {"options", Json::parse(ws::to_json(options))}};
+  for (const ws::View& view : rig.views) settings["views"].push_back(to_json(view));
+  return settings;
+}
+
+/// How well a frame was matched, over all its views.
+struct Quality {
+  double accepted = 0;
+  double mean_cost = 0;
+};
+
+Quality quality_of(const ws::StereoResult& result) {
+  Quality quality;
+  const auto views = static_cast<double>(result.views.size());
+  for (const ws::ViewResult& view : result.views) {
+    quality.accepted += accepted_share(view) / views;
+    quality.mean_cost += ws::consistency_scores(view.differences, view.cost).mean_cost / views;
+  }
+  return quality;
+}
+
+/// Matches frame after frame, each from the one before it.
+class SequenceRun {
+ public:
+  SequenceRun(const SequenceArguments& arguments, Selection selection)
+      : arguments_(arguments),
+        selection_(std::move(selection)),
+        rig_(arguments.rig.rig_for_images(selection_.frames.front().images.size(),
+                                          read_images(selection_.frames.front()).front().size())),
+        options_(arguments.settings.options()),
+        device_(open_device(arguments.settings)),
+        folder_(arguments.output, settings_of(arguments, rig_, options_, device_.info()),
+                arguments.overwrite),
+        bar_("Matching on " + device_.info().name) {}
+
+  void run() {
+    const std::size_t finished = folder_.finished(selection_.names());
+    remaining_ = selection_.frames.size() - finished;
+    if (remaining_ == 0) return;
+    ws::Matcher matcher(device_, rig_, options_);
+    if (finished > 0) take_up(finished - 1);
+    for (std::size_t i = finished; i < selection_.frames.size(); ++i) match(matcher, i);
+  }
+
+  const SequenceFolder& folder() const { return folder_; }
+
+ private:
+  /// What the next frame starts from.
+  struct Previous {
+    std::vector<cv::Mat> images;
+    std::vector<ws::ViewResult> views;
+    bool on_device = false;
+  };
+
+  struct Frame {
+    MatchingRun run;
+    std::string start = "cold";
+    std::string motion;
+    double motion_milliseconds = 0;
+  };
+
+  void take_up(std::size_t last) {
+    const ws::SequenceFrame& frame = selection_.frames[last];
+    previous_ = {read_images(frame), folder_.planes(frame.name, rig_)};
+    require_sizes(frame, previous_.images, rig_);
+    for (const Json& record : folder_.frames()) note_cold(record);
+  }
+
+  void note_cold(const Json& record) {
+    if (record["start"] == "warm") return;
+    cold_ = {record["accepted"].get<double>(), record["mean_cost"].get<double>()};
+  }
+
+  void match(ws::Matcher& matcher, std::size_t index) {
+    const ws::SequenceFrame& source = selection_.frames[index];
+    const std::vector<cv::Mat> images = read_images(source);
+    require_sizes(source, images, rig_);
+    ws::Matcher::Progress progress;
+    if (bar_.visible()) {  // without it a device need not wait between kernels
+      progress = [this](double share) {
+        bar_.show((static_cast<double>(matched_) + share) / static_cast<double>(remaining_));
+      };
+    }
+    Frame frame;
+    frame.run.options = options_;
+    frame.run.device = device_.info();
+    ws::StereoResult& result = frame.run.result;
+    if (arguments_.no_warm_start || previous_.views.empty()) {
+      result = matcher.match(images, progress);
+    } else {
+      result = matcher.match_next(images, warm_start(index, images, frame), progress);
+      frame.start = "warm";
+      if (is_worse(quality_of(result))) {
+        const ws::StereoResult warm = std::move(result);
+        result = matcher.match(images, progress);
+        result.milliseconds += warm.milliseconds;
+        result.samples += warm.samples;
+        frame.start = "cold after warm";
+      }
+    }
+    require_no_validation_messages(device_);
+    write(source, images, frame);
+    previous_ = {images, std::move(result.views), true};
+    ++matched_;
+  }
+
+  ws::WarmStart warm_start(std::size_t index, const std::vector<cv::Mat>& images, Frame& frame) {
+    ws::WarmStart start;
+    start.frame = static_cast<int>(index);
+    if (!previous_.on_device) {
+      for (const ws::ViewResult& view : previous_.views)
+        start.hypotheses.push_back(view.hypotheses);
+    }
+    if (arguments_.no_motion) {
+      frame.motion = "none";
+    } else if (!selection_.poses.empty()) {
+      frame.motion = "poses";
+      start.now_from_previous = selection_.poses[index].inverse() * selection_.poses[index - 1];
+    } else {
+      const auto begin = std::chrono::steady_clock::now();
+      start.now_from_previous =
+          ws::estimate_motion(rig_, previous_.images, previous_.views, images);
+      frame.motion = start.now_from_previous ? "estimated" : "not found";
+      frame.motion_milliseconds =
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+              .count();
+    }
+    return start;
+  }
+
+  /// Than the last cold frame: what is seen is another scene, or the planes went astray.
+  bool is_worse(const Quality& quality) const {
+    return quality.accepted < arguments_.restart_below * cold_.accepted;
+  }
+
+  void write(const ws::SequenceFrame& source, const std::vector<cv::Mat>& images,
+             const Frame& frame) {
+    const ws::StereoResult& result = frame.run.result;
+    const Quality quality = quality_of(result);
+    Json record = {{"name", source.name},
+                   {"start", frame.start},
+                   {"motion", frame.motion},
+                   {"milliseconds", result.milliseconds},
+                   {"motion_milliseconds", frame.motion_milliseconds},
+                   {"patch_samples", result.samples},
+                   {"accepted", quality.accepted},
+                   {"mean_cost", quality.mean_cost}};
+    note_cold(record);
+    folder_.add(source.name, result.views, [&](const fs::path& folder) {
+      FolderContents contents{.rig = rig_, .images = images, .run = frame.run};
+      for (const fs::path& image : source.images)
+        contents.origin["images"].push_back(image.string());
+      contents.origin["calibration"] = arguments_.rig.calibration;
+      contents.origin["frame"] = record;
+      write_result_folder(folder, contents, arguments_.format);
+      return record;
+    });
+    if (arguments_.as_json || bar_.visible()) return;
+    std::printf("%s: %s%s%s, %.2f s, %.1f %% accepted, mean cost %.3f (%zu of %zu)\n",
+                source.name.c_str(), frame.start.c_str(), frame.motion.empty() ? "" : ", motion ",
+                frame.motion.c_str(), (result.milliseconds + frame.motion_milliseconds) / 1000,
+                100 * quality.accepted, quality.mean_cost, folder_.frames().size(),
+                selection_.frames.size());
+    std::fflush(stdout);
+  }
+
+  const SequenceArguments& arguments_;
+  Selection selection_;
+  ws::Rig rig_;
+  ws::Options options_;
+  ws::Device device_;
+  SequenceFolder folder_;
+  ProgressBar bar_;
+  Previous previous_;
+  Quality cold_;
+  std::size_t remaining_ = 0;
+  std::size_t matched_ = 0;
+};
+
+/// Means over the frames of one kind.
+void summarise(const Json& frames, bool warm) {
+  double milliseconds = 0;
+  double samples = 0;
+  int count = 0;
+  for (const Json& frame : frames) {
+    if ((frame["start"] == "warm") != warm) continue;
+    milliseconds +=
+        frame["milliseconds"].get<double>() + frame["motion_milliseconds"].get<double>();
+    samples += frame["patch_samples"].get<double>();
+    ++count;
+  }
+  if (count == 0) return;
+  std::printf("%d %s: %.2f s and %.0f million patch samples each\n", count,
+              warm ? "started from the previous frame" : "cold", milliseconds / count / 1000,
+              samples / count / 1e6);
+}
+
+void run_sequence(const SequenceArguments& arguments) {
+  SequenceRun run(arguments, select_frames(arguments));
+  run.run();
+  if (arguments.as_json) {
+    std::cout << run.folder().record().dump(2) << "\n";
+    return;
+  }
+  std::printf("%zu frames are in %s\n", run.folder().frames().size(), arguments.output.c_str());
+  summarise(run.folder().frames(), false);
+  summarise(run.folder().frames(), true);
+}
+
+}  // namespace
+
+void add_sequence_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "sequence",
+      "Match many frames, each started from the planes of the one before; run it again to resume");
+  auto a = std::make_shared<SequenceArguments>();
+  command
+      ->add_option(
+          "dataset", a->dataset,
+          "Folder with cam0/, cam1/, ... (frames have equal file names), or in EuRoC or TUM "
+          "VI layout (mav0/camN/data, data.csv)")
+      ->required();
+  a->rig.add_to(*command);
+  command
+      ->add_option("-o,--output", a->output,
+                   "Folder for the results: one folder for each frame, and sequence.json")
+      ->required();
+  const std::string frames = "Frames";
+  command->add_option("--first", a->first, "First frame, counted from 0")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(frames);
+  command->add_option("--count", a->count, "Number of frames at most, 0 = all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(frames);
+  command->add_option("--step", a->step, "Take every so many frames")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->group(frames);
+  command->add_flag("--skip-incomplete", a->skip_incomplete, "Leave out frames that a camera lacks")
+      ->group(frames);
+  const std::string start = "Warm start";
+  command
+      ->add_option("--poses", a->poses,
+                   "TUM trajectory, camera 0 of the calibration to world; without it the motion is "
+                   "estimated from the images")
+      ->group(start);
+  command
+      ->add_option("--poses-tolerance", a->poses_tolerance,
+                   "Largest difference of time between frame and pose, seconds")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(start);
+  command->add_flag("--no-motion", a->no_motion, "Start where the planes were: no motion")
+      ->group(start);
+  command->add_flag("--no-warm-start", a->no_warm_start, "Match every frame by itself")
+      ->group(start);
+  command
+      ->add_option("--restart-below", a->restart_below,
+                   "Match a frame by itself when less than this share of what the last such frame "
+                   "had is accepted; 0 = never")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str()
+      ->group(start);
+  command->add_flag("--overwrite", a->overwrite, "Remove the frames of an earlier run first");
+  a->format.add_for_many_frames_to(*command);
+  command->add_flag("--json", a->as_json, "Print the sequence's record as JSON");
+  a->settings.add_to(*command);
+  command->callback([a] { run_sequence(*a); });
+}

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// The output folder of a sequence: one result folder for each frame, complete or absent, and the
+// record sequence.json.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "widestereo/matcher.h"
+#include "widestereo/rig.h"
+
+class SequenceFolder {
+ public:
+  using Json = nlohmann::ordered_json;
+
+  /// Takes up the folder where an earlier run left it. `settings`: all that decides the results;
+  /// throws Error naming the first difference to those of an earlier run, whose frames are removed
+  /// instead with `overwrite`.
+  SequenceFolder(std::filesystem::path folder, const Json& settings, bool overwrite);
+
+  /// How many of these frames, from the first on, are there already. Forgets all others.
+  std::size_t finished(const std::vector<std::string>& names);
+  /// Records of the finished frames, in order.
+  const Json& frames() const { return record_["frames"]; }
+  const Json& record() const { return record_; }
+
+  /// Adds a frame: `write` fills the folder that it is given and returns the frame's record. The
+  /// frame appears when all of it is there. Its planes are kept until the next one is.
+  void add(const std::string& name, const std::vector<widestereo::ViewResult>& views,
+           const std::function<Json(const std::filesystem::path&)>& write);
+
+  /// What the next frame starts from: hypotheses and reasons of a frame's views, empty where its
+  /// files are not there or do not fit.
+  std::vector<widestereo::ViewResult> planes(const std::string& name,
+                                             const widestereo::Rig& rig) const;
+
+ private:
+  void read(const Json& settings, bool overwrite);
+
+  std::filesystem::path folder_;
+  Json record_;
+};
