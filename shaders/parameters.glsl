@@ -14,7 +14,8 @@ struct ViewPair {
 // std140 uniform block.
 struct MatchParameters {
   vec4 range;         // min and max distance (m), min and max inverse distance (1/m)
-  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; smallest support
+  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; smallest
+                      // support
   vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
   ivec4 search;       // distance sampling, refinements, best sources, number of views
   vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;

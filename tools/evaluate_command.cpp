@@ -72,8 +72,8 @@ void run_evaluate(EvaluateArguments a) {
   std::vector<ws::ReliabilityBin> bins;
   if (!a.confidence.empty()) {
     const cv::Mat confidence = ws::read_map(a.confidence);
-    curve = ws::sparsification(prediction, confidence, truth, rig.views[a.view],
-                               rig.views[a.source]);
+    curve =
+        ws::sparsification(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
     bins = ws::reliability(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
   }
   if (a.as_json) {
@@ -94,9 +94,10 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("prediction", a->prediction, "Distance map: .tiff, .pfm or 16-bit .png in mm")
       ->required();
   command->add_option("--normals", a->normals, "Normal map to score as well");
-  command->add_option("--confidence", a->confidence,
-                      "Confidence map: prints the error of the most confident pixels, and how often pixels "
-                      "of each confidence are right");
+  command->add_option(
+      "--confidence", a->confidence,
+      "Confidence map: prints the error of the most confident pixels, and how often pixels "
+      "of each confidence are right");
   command->add_option("--set", a->set, "Folder with depthN.tiff, validN.png, occN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");

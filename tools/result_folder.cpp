@@ -144,7 +144,8 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
        "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
       {"cost", "1 - ZNCC in [0, 2]; 2 = no plane, 1 = no texture"},
       {"confidence",
-       "probability that the point is within 2 px of its true place in the other view; 0 = no plane "
+       "probability that the point is within 2 px of its true place in the other view; 0 = no "
+       "plane "
        "of its own"},
       {"reasons",
        "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "

@@ -29,10 +29,10 @@ struct CudaMap {
 
 /// Results for one reference view; the same values as in ViewResult.
 struct CudaViewMaps {
-  CudaMap<float> distance;        ///< metres along the unit ray, 0 = no plane; not filtered
-  CudaMap<float> normals;         ///< x y z of each pixel next to each other, 12 bytes a pixel
-  CudaMap<float> cost;            ///< 1 - ZNCC in [0, 2], 2 = no plane
-  CudaMap<float> confidence;      ///< in [0, 1]
+  CudaMap<float> distance;         ///< metres along the unit ray, 0 = no plane; not filtered
+  CudaMap<float> normals;          ///< x y z of each pixel next to each other, 12 bytes a pixel
+  CudaMap<float> cost;             ///< 1 - ZNCC in [0, 2], 2 = no plane
+  CudaMap<float> confidence;       ///< in [0, 1]
   CudaMap<std::uint16_t> reasons;  ///< Reason bits, 0 = accepted
 };
 

@@ -81,7 +81,8 @@ std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const c
 std::string to_table(const std::vector<SparsificationPoint>& curve);
 std::string to_json(const std::vector<SparsificationPoint>& curve);
 
-/// How often pixels of about the same confidence are right: displaced by at most 2 px in the source.
+/// How often pixels of about the same confidence are right: displaced by at most 2 px in the
+/// source.
 struct ReliabilityBin {
   double low = 0, high = 1;  ///< confidence: low <= c < high
   long pixels = 0;

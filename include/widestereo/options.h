@@ -71,11 +71,12 @@ struct Options {
   /// A neighbourhood of a quarter or half the radius is taken where it determines the plane to this
   /// standard deviation (source pixels, nominal: neighbours count as independent); > 0.
   double regression_precision = 0.013;
-  /// After each regression at full size, pixels that fail the checks take the plane of accepted ones
-  /// up to this many pixels away, as a new hypothesis, 0..10000; 0 = none do.
+  /// After each regression at full size, pixels that fail the checks take the plane of accepted
+  /// ones up to this many pixels away, as a new hypothesis (not in frames started from the one
+  /// before), 0..10000; 0 = none do.
   int repair_radius = 32;
-  /// How much better (cost) the nearest planes must match than the farthest, so that surfaces without
-  /// texture and sky come out as far, 0..2.
+  /// How much better (cost) the nearest planes must match than the farthest, so that surfaces
+  /// without texture and sky come out as far, 0..2.
   double far_preference = 0;
   double step_pixels = 1;     ///< first perturbation, source pixels; halved each iteration
   double step_normal = 0.5;   ///< first perturbation of a unit normal; halved each iteration
@@ -99,8 +100,8 @@ struct Options {
   double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2
   double min_parallax = 0.5;  ///< pixels between min_distance and max_distance in the source view
   double max_tilt = 85;       ///< degrees between the normal and the viewing ray, 0..90
-  /// Smallest share of the planes around (40 pixels wide) that put the pixel's point within a source
-  /// pixel of its own place, 0..1; fewer are a speckle.
+  /// Smallest share of the planes around (40 pixels wide) that put the pixel's point within a
+  /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;
   /// Reject where a place 2, 4 or 8 source pixels away costs less by more than this, 0..2; 0 = not
   /// checked.

@@ -21,16 +21,16 @@ struct ReasonStyle {
   cv::Vec3b colour;
 };
 const std::array<ReasonStyle, 11> reason_styles = {{{"no ray", {48, 48, 48}},
-                                                   {"no overlap", {160, 90, 40}},
-                                                   {"no texture", {200, 200, 60}},
-                                                   {"high cost", {60, 60, 220}},
-                                                   {"inconsistent", {40, 150, 250}},
-                                                   {"unchecked", {190, 80, 190}},
-                                                   {"low parallax", {120, 220, 120}},
-                                                   {"tilt", {200, 150, 250}},
-                                                   {"ambiguous", {60, 200, 250}},
-                                                   {"speckle", {230, 80, 40}},
-                                                   {"filled", {150, 150, 150}}}};
+                                                    {"no overlap", {160, 90, 40}},
+                                                    {"no texture", {200, 200, 60}},
+                                                    {"high cost", {60, 60, 220}},
+                                                    {"inconsistent", {40, 150, 250}},
+                                                    {"unchecked", {190, 80, 190}},
+                                                    {"low parallax", {120, 220, 120}},
+                                                    {"tilt", {200, 150, 250}},
+                                                    {"ambiguous", {60, 200, 250}},
+                                                    {"speckle", {230, 80, 40}},
+                                                    {"filled", {150, 150, 150}}}};
 
 /// `share` in [0, 1] through a colour map; pixels where `valid` is 0 get the colour of no value.
 cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {

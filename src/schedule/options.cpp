@@ -41,7 +41,7 @@ Options Options::preset_named(const std::string& name) {
   options.weight_scale = 12;
   options.min_texture = 0;
   options.max_cost = 0.8;
-  options.far_preference = 0.08;
+  options.far_preference = 0.02;
   options.warm_iterations = 1;
   if (name == "fast") {
     options.pattern = PatchPattern::checkerboard;

@@ -263,8 +263,8 @@ class Builder {
       }
     }
     if (options_.warm_regressions == 0) return;
-    repair();
-    // Measured once for all rounds, so that planes need their costs after the last one only.
+    // Measured once for all rounds, so that planes need their costs after the last one only. No
+    // repair: taken from farther pixels frame after frame, planes would drift.
     for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
     for (int i = 1; i <= options_.warm_regressions; ++i) {
       const bool last = i == options_.warm_regressions;

@@ -356,7 +356,7 @@ TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
 
 TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   Options options = wide_range();
-  options.far_preference = 0.08;
+  options.far_preference = 0.02;
   KernelFixture fixture(fisheye_rig(96), options);
   const ivec2 pixel(48, 48);
   const cv::Vec4f r = fixture.view(0).rays(48, 48);
@@ -371,8 +371,7 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   for (int view = 0; view < 2; ++view) fixture.view(view).intensities.setTo(0.5);
   EXPECT_NEAR(chosen_distance(2, NO_INFORMATION_COST, 90), 90, 0.01) << "nothing to see: far";
   EXPECT_NEAR(chosen_distance(90, NO_INFORMATION_COST, 2), 90, 0.01);
-  EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4)
-      << "a difference in cost outweighs it";
+  EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4) << "a difference in cost outweighs it";
 }
 
 }  // namespace
