@@ -183,7 +183,7 @@ void FolderFormat::add_to(CLI::App& command) {
 void FolderFormat::add_for_many_frames_to(CLI::App& command) {
   add_maps_to(command);
   no_cloud = no_pictures = true;
-  command.add_flag("--clouds{false}", no_cloud, "Write point clouds (camera's frame)")
+  command.add_flag("--clouds{false}", no_cloud, "Write point clouds (the rig's frame; poses are not applied)")
       ->group(group);
   command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
 }
