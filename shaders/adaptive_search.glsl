@@ -78,9 +78,10 @@ FN vec3 surroundings_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) {
     if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) return none;
     vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
     vec4 r = ray_at(CONTEXT PASS.reference, q);
-    float w = plane.x * r.x + plane.y * r.y + plane.z * r.z;
+    vec3 direction = vec3(r.x, r.y, r.z);
+    float w = inverse_distance_of(plane, direction);
     if (w <= 0.0f) return none;
-    points[i] = (1.0f / w) * vec3(r.x, r.y, r.z);
+    points[i] = (1.0f / w) * direction;
   }
   vec3 normal = cross(points[1] - points[0], points[3] - points[2]);
   float facing = dot(normal, ray);
@@ -123,7 +124,7 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  float w = held.x * ray.x + held.y * ray.y + held.z * ray.z;
+  float w = inverse_distance_of(held, ray);
   if (!is_usable(CONTEXT pixel, usable_ray)) return;
   if (w <= 0.0f) held = vec4(PARAMETERS.range.z * ray, INVALID_COST);
   int source = first_source(CONTEXT_ONLY);

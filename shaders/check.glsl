@@ -66,7 +66,7 @@ FN float support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w
       vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
       if (plane.w >= INVALID_COST) continue;
       planes += 1.0f;
-      float difference = plane.x * ray.x + plane.y * ray.y + plane.z * ray.z - w;
+      float difference = inverse_distance_of(plane, ray) - w;
       if (abs(difference) * speed < SUPPORT_DISPLACEMENT) supporting += 1.0f;
     }
   }

@@ -6,6 +6,11 @@ FN vec3 plane_through(vec3 ray, float distance, vec3 normal) {
   return (1.0f / (distance * dot(normal, ray))) * normal;
 }
 
+// Inverse distance along a ray of the plane (m, cost).
+FN float inverse_distance_of(vec4 hypothesis, vec3 ray) {
+  return hypothesis.x * ray.x + hypothesis.y * ray.y + hypothesis.z * ray.z;
+}
+
 FN vec3 rotate(ViewPair pair, vec3 v) {
   return vec3(pair.row0.x * v.x + pair.row0.y * v.y + pair.row0.z * v.z,
               pair.row1.x * v.x + pair.row1.y * v.y + pair.row1.z * v.z,

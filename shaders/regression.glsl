@@ -146,7 +146,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       if (forward < 0.1f) continue;
       float x = TANGENT_SCALE * dot(direction, east) / forward;
       float y = TANGENT_SCALE * dot(direction, south) / forward;
-      float w = (plane.x * r.x + plane.y * r.y + plane.z * r.z) / forward;
+      float w = inverse_distance_of(plane, direction) / forward;
       float residual = (w - guess.offset - guess.slope_x * x - guess.slope_y * y) * measure.y;
       // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own.
       float scale2 = 2.0f * min(measure.x + own_variance, LARGEST_RESIDUAL * LARGEST_RESIDUAL);

@@ -84,7 +84,7 @@ FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m, flo
   float cost = patch_cost(CONTEXT pixel, m);
   if (cost >= INVALID_COST) return held;
   float w = dot(m, ray);
-  float w_held = held.x * ray.x + held.y * ray.y + held.z * ray.z;
+  float w_held = inverse_distance_of(held, ray);
   float handicap = 0.0f;
   if (abs(w - w_held) > small) handicap = nearness_penalty(CONTEXT w) - nearness_penalty(CONTEXT w_held);
   if (cost + handicap < held.w) return vec4(m, cost);

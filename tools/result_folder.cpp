@@ -145,8 +145,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"cost", "1 - ZNCC in [0, 2]; 2 = no plane, 1 = no texture"},
       {"confidence",
        "probability that the point is within 2 px of its true place in the other view; 0 = no "
-       "plane "
-       "of its own"},
+       "plane of its own"},
       {"reasons",
        "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
        "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle; 1024 = filled all the "
@@ -183,7 +182,9 @@ void FolderFormat::add_to(CLI::App& command) {
 void FolderFormat::add_for_many_frames_to(CLI::App& command) {
   add_maps_to(command);
   no_cloud = no_pictures = true;
-  command.add_flag("--clouds{false}", no_cloud, "Write point clouds (the rig's frame; poses are not applied)")
+  command
+      .add_flag("--clouds{false}", no_cloud,
+                "Write point clouds (the rig's frame; poses are not applied)")
       ->group(group);
   command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
 }

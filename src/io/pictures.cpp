@@ -176,9 +176,11 @@ cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high) {
 cv::Mat with_reason_legend(const cv::Mat& picture) {
   const double scale = text_scale(picture);
   const int line = static_cast<int>(30 * scale);
-  cv::Mat result = with_strip(picture, 17 * line / 4);
+  const int count = static_cast<int>(reason_styles.size());
+  const int rows = (count + 3) / 4;
+  cv::Mat result = with_strip(picture, (2 + 5 * rows) * line / 4);
   const int column = picture.cols / 4;
-  for (int i = 0; i < static_cast<int>(reason_styles.size()); ++i) {
+  for (int i = 0; i < count; ++i) {
     const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
     const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
     cv::rectangle(result, box, cv::Scalar(reason_styles[i].colour), cv::FILLED);
