@@ -54,6 +54,16 @@ FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   return length(there - here) / abs(step);
 }
 
+// In the source where it is fastest.
+FN float speed_in_sources(CONTEXT_ARGUMENT vec3 ray, float w) {
+  float speed = 0.0f;
+  for (int source = 0; source < VIEW_COUNT; ++source) {
+    if ((PASS.sources & (1u << uint(source))) == 0u) continue;
+    speed = max(speed, speed_in_source(CONTEXT source, ray, w));
+  }
+  return speed;
+}
+
 // Share of the surrounding planes that put the pixel's point where its own does. `speed`: source pixels per
 // unit of inverse distance.
 FN float support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
@@ -111,13 +121,12 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   } else if (held.w >= INVALID_COST) {
     reasons = REASON_NO_OVERLAP;
   } else {
-    float speed = 0.0f;
     float w = dot(m, ray);
+    float speed = speed_in_sources(CONTEXT ray, w);
     for (int source = 0; source < VIEW_COUNT; ++source) {
       if ((PASS.sources & (1u << uint(source))) == 0u) continue;
       vec2 candidate = difference_from_source(CONTEXT source, pixel, ray, m);
       if (candidate.y < difference.y) difference = candidate;
-      speed = max(speed, speed_in_source(CONTEXT source, ray, w));
     }
     vec4 limits = PARAMETERS.check_limits;
     float variance = reference_variance(CONTEXT pixel);

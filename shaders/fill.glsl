@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Filling of rejected pixels from the nearest accepted ones in eight directions.
 
-// Stores as prior (m, 1) the plane that the pixel would take over, zero where there is none: the lower quartile
-// of inverse distance, since occluded pixels belong to the farther surface, weighted by likeness of intensity.
+// Share of the planes around, counted from the farthest, that says which surface a pixel belongs to: occluded
+// pixels, and those that a nearer surface's patches reach over, belong to the farther one.
+#define FAR_SHARE 0.25f
+// Displacement (source pixels) up to which planes belong to one surface.
+#define SURFACE_DISPLACEMENT 1.0f
+
+// Stores as prior (m, 1) the plane that the pixel would take over, zero where there is none: the median of the
+// surface at the FAR_SHARE of the planes around, both weighted by likeness of intensity.
 FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
@@ -42,10 +48,21 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
   }
   vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
-  float sum = 0.0f;
-  for (int i = 0; i < count && prior.w == 0.0f; ++i) {
-    sum += weights[i];
-    if (sum >= 0.25f * total) prior = vec4(planes[i], 1.0f);
+  if (count > 0) {
+    int chosen = 0;
+    float sum = weights[0];
+    while (sum < FAR_SHARE * total && chosen + 1 < count) sum += weights[++chosen];
+    float w = dot(planes[chosen], ray);
+    float reach = SURFACE_DISPLACEMENT / max(speed_in_sources(CONTEXT ray, w), 1e-9f);
+    int first = 0;
+    while (dot(planes[first], ray) < w - reach) ++first;
+    int end = first;
+    float of_surface = 0.0f;
+    while (end < count && dot(planes[end], ray) <= w + reach) of_surface += weights[end++];
+    chosen = first;
+    sum = weights[first];
+    while (sum < 0.5f * of_surface && chosen + 1 < end) sum += weights[++chosen];
+    prior = vec4(planes[chosen], 1.0f);
   }
   store_prior(CONTEXT PASS.reference, pixel, prior);
 }

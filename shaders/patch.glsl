@@ -46,17 +46,33 @@ FN bool warp_pixel(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int 
   return warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position);
 }
 
-// The plane (m, cost) that a source holds where the pixel's point lands in it; INVALID_COST where it lands
-// outside.
-FN vec4 hypothesis_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
-  vec4 none = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
+// The pixel of the source in which the point lands; false where it lands outside.
+FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2) q) {
   ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
-  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return none;
-  ivec2 q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
-  if (!in_image(camera.size, q)) return none;
+  q = ivec2(0, 0);
+  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return false;
+  q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
+  return in_image(camera.size, q);
+}
+
+// The plane (m, cost) that a source holds where the pixel's point lands in it; INVALID_COST where it lands
+// outside.
+FN vec4 hypothesis_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
+  ivec2 q;
+  if (!pixel_in_source(CONTEXT source, ray, m, q)) return vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
   return hypothesis_at(CONTEXT source, q);
+}
+
+// Whether a source may see the point, if not enough of the patch around it for a cost.
+FN bool in_some_source(CONTEXT_ARGUMENT vec3 ray, vec3 m) {
+  ivec2 q;
+  for (int source = 0; source < VIEW_COUNT; ++source) {
+    if ((PASS.sources & (1u << uint(source))) == 0u) continue;
+    if (pixel_in_source(CONTEXT source, ray, m, q)) return true;
+  }
+  return false;
 }
 
 // Second-order map of pixel offsets into the source: u = u0 + x ux + y uy + x^2 uxx + x y uxy + y^2 uyy.

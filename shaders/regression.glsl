@@ -118,7 +118,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float centre = intensity_at(CONTEXT PASS.reference, pixel);
   int radius = max(PASS.steps >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
   float fall_off = 2.0f / float(radius * radius);
-  int step = max(radius / 4, 1);
+  int step = max(radius / 3, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;

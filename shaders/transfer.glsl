@@ -118,7 +118,7 @@ FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   return random_plane(CONTEXT pixel, ray, 0);
 }
 
-// Starts a pixel from the plane that has moved there.
+// Starts a pixel from the plane that has moved there, which was seen before where its patch now is not.
 FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   if (!is_usable(CONTEXT pixel, usable_ray)) {
@@ -129,5 +129,7 @@ FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
   vec3 m = vec3(prior.x, prior.y, prior.z);
   if (prior.w == 0.0f) m = moved_plane_nearby(CONTEXT pixel, ray);
-  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+  float cost = patch_cost(CONTEXT pixel, m);
+  if (cost >= INVALID_COST && in_some_source(CONTEXT ray, m)) cost = NO_INFORMATION_COST;
+  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
 }

@@ -263,8 +263,7 @@ class Builder {
       }
     }
     if (options_.warm_regressions == 0) return;
-    // Measured once for all rounds, so that planes need their costs after the last one only. No
-    // repair: taken from farther pixels frame after frame, planes would drift.
+    // Measured once for all rounds, so that planes need their costs after the last one only.
     for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
     for (int i = 1; i <= options_.warm_regressions; ++i) {
       const bool last = i == options_.warm_regressions;
@@ -272,6 +271,7 @@ class Builder {
         regress_measured(view, 0, options_.warm_precision, last ? regress_normals : adopt_unseen);
       }
     }
+    repair();
   }
 
   void iterate(int view, int iterations) {
