@@ -18,11 +18,11 @@ constexpr int map_offset_quadratic = 23;
 constexpr int map_axis = 15;
 constexpr int map_corners = 9;
 constexpr int weight_of_sample = 2;  // a product and an exponential
-constexpr int zncc_cost = 15;  // and the visible share's limit
+constexpr int zncc_cost = 15;        // and the visible share's limit
 
 /// Of project(); sources of several models count as pinholes, which take least.
 int projection(int model) {
-  constexpr int common = 7;      // the length, and the field of view's limit
+  constexpr int common = 7;       // the length, and the field of view's limit
   constexpr int perspective = 2;  // two divisions
   constexpr int distortion = 29;
   constexpr int to_pixels = 6;
@@ -149,8 +149,8 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const PatchOperations operations = patch_operations(schedule.constants);
   const auto samples = static_cast<double>(dispatch.samples);
   const double patches =
-      samples / static_cast<double>(samples_of_patch(schedule.constants.window_radius,
-                                                     schedule.constants.pattern));
+      samples / static_cast<double>(
+                    samples_of_patch(schedule.constants.window_radius, schedule.constants.pattern));
   const double pixels = static_cast<double>(dispatch.width) * dispatch.height;
   const Traffic traffic = traffic_of(dispatch);
   const int sources = std::popcount(dispatch.pass.sources);

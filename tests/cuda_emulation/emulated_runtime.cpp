@@ -149,6 +149,11 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
 }
 cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int) {
   *value = 0;
+  // An H200's.
+  if (attribute == cudaDevAttrClockRate) *value = 1980000;
+  if (attribute == cudaDevAttrMultiProcessorCount) *value = 132;
+  if (attribute == cudaDevAttrMemoryClockRate) *value = 3201000;
+  if (attribute == cudaDevAttrGlobalMemoryBusWidth) *value = 6144;
   if (attribute == cudaDevAttrComputeMode) *value = emulation().compute_mode;
   if (attribute == cudaDevAttrKernelExecTimeout) *value = emulation().time_limit ? 1 : 0;
   return cudaSuccess;
