@@ -267,6 +267,12 @@ cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
   ++emulation().live_objects;
   return cudaSuccess;
 }
+cudaError_t cudaStreamIsCapturing(cudaStream_t stream, cudaStreamCaptureStatus* status) {
+  if (stream == nullptr && anything_captures()) return cudaErrorStreamCaptureUnsupported;
+  *status = stream != nullptr && stream->capturing != nullptr ? cudaStreamCaptureStatusActive
+                                                              : cudaStreamCaptureStatusNone;
+  return step();
+}
 cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
   *graph = std::exchange(stream->capturing, nullptr);
   if (*graph == nullptr) return cudaErrorInvalidValue;
@@ -290,6 +296,7 @@ cudaError_t cudaGraphInstantiateWithFlags(cudaGraphExec_t* exec, cudaGraph_t gra
   return cudaSuccess;
 }
 cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
+  if (resolve(stream)->capturing != nullptr) return cudaErrorStreamCaptureUnsupported;
   if (const cudaError_t error = step()) return error;
   for (const Work& node : exec->nodes) enqueue(stream, node);
   return cudaSuccess;

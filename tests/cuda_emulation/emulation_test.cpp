@@ -49,6 +49,7 @@ class CudaEmulation : public ::testing::Test {
     const CudaViewMaps maps[2] = {};
     matcher.enqueue(images, maps, nullptr);
     matcher.enqueue(images, maps, nullptr);
+    matcher.enqueue_next(images, maps, nullptr);
     cudaDeviceSynchronize();
   }
 
@@ -159,7 +160,11 @@ TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
   matcher.enqueue(images, maps, nullptr);
   const int live = emulation().live_objects;
   const int kernels = emulation().kernels_run;
-  for (int i = 0; i < 3; ++i) matcher.enqueue(images, maps, nullptr);
+  for (int i = 0; i < 3; ++i) {
+    matcher.enqueue(images, maps, nullptr);
+    matcher.enqueue_next(images, maps, nullptr);
+    matcher.enqueue_next(images, maps, nullptr, {.frame = i});
+  }
   EXPECT_EQ(emulation().live_objects, live);
   EXPECT_EQ(emulation().kernels_run, kernels);  // nothing has waited
   cudaDeviceSynchronize();
