@@ -2,6 +2,7 @@
 // Compiled without fused multiply-add, so that values equal the host's.
 #include <cuda_runtime.h>
 
+#include <initializer_list>
 #include <type_traits>
 
 #include "cuda/convert_maps.h"
