@@ -141,7 +141,6 @@ Json json_of(const Measurement& m) {
         json_of(kernel.work, kernel.milliseconds, roofline(kernel.work, peaks));
     kernels[kernel.kernel]["dispatches"] = kernel.dispatches;
   }
-  const auto or_null = [](double peak) { return peak > 0 ? Json(peak) : Json(nullptr); };
   return {{"device", m.device.id},
           {"name", m.device.name},
           {"preset", m.preset},
@@ -153,10 +152,7 @@ Json json_of(const Measurement& m) {
           {"samples_per_pixel", work.samples / m.pixels()},
           {"million_samples_per_second", work.samples / m.on_device / 1000},
           {"device_bytes", m.device_bytes},
-          {"peaks",
-           {{"gflops", or_null(peaks.gflops)},
-            {"gtexels", or_null(peaks.gtexels)},
-            {"gbps", or_null(peaks.gbps)}}},
+          {"peaks", to_json(peaks)},
           {"on_device", json_of(work, m.on_device, roofline(m.kernels, peaks))},
           {"kernels", kernels}};
 }

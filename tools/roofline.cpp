@@ -34,3 +34,12 @@ Roofline roofline(const std::vector<ws::KernelTime>& kernels, const ws::DevicePe
   }
   return sum;
 }
+
+nlohmann::ordered_json to_json(const ws::DevicePeaks& peaks) {
+  const auto or_null = [](double peak) {
+    return peak > 0 ? nlohmann::ordered_json(peak) : nlohmann::ordered_json(nullptr);
+  };
+  return {{"gflops", or_null(peaks.gflops)},
+          {"gtexels", or_null(peaks.gtexels)},
+          {"gbps", or_null(peaks.gbps)}};
+}

@@ -2,6 +2,7 @@
 // How near a match comes to what a device can do.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -20,3 +21,6 @@ Roofline roofline(const widestereo::KernelWork& work, const widestereo::DevicePe
 /// Of kernels one after the other: the sum, and the bound that makes up most of it.
 Roofline roofline(const std::vector<widestereo::KernelTime>& kernels,
                   const widestereo::DevicePeaks& peaks);
+
+/// Null where a peak is not known.
+nlohmann::ordered_json to_json(const widestereo::DevicePeaks& peaks);

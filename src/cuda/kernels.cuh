@@ -96,8 +96,8 @@ struct Algorithm {
     atomicMin(context.transfer_winner + transfer_index(CONTEXT p), index);
   }
 
-  /// Of weights and confidences, for which the hardware's precision does: two instructions instead
-  /// of eleven in the loop over a patch.
+  /// Of weights and confidences, for which the hardware's precision does: two instructions of PTX
+  /// instead of eleven in the loop over a patch.
   FN float exp(float a) { return __expf(a); }
 
   // The order matters.
