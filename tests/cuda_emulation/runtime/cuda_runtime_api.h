@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The part of CUDA's header of this name that the back end uses, for running it without a GPU.
-// Implemented in emulated_runtime.cpp. CUDA 11.8 has all of it with the same parameters: what it has
-// not (the newer cudaGraphInstantiate, cudaGraphExecUpdate) or CUDA 13 lacks (clocks among a
+// Implemented in emulated_runtime.cpp. CUDA 11.8 has all of it with the same parameters: what it
+// has not (the newer cudaGraphInstantiate, cudaGraphExecUpdate) or CUDA 13 lacks (clocks among a
 // device's properties) is not used.
 #pragma once
 
