@@ -160,10 +160,11 @@ FN int first_column(CONTEXT_ARGUMENT int row) {
   return -WINDOW_RADIUS + (PATTERN == PATTERN_CHECKERBOARD ? (WINDOW_RADIUS + row) & 1 : 0);
 }
 
-// Weight of a sample whose intensity differs from the centre's by `difference`.
-FN float sample_weight(CONTEXT_ARGUMENT float difference) {
+// Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
+// which loops read once.
+FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
   if (WEIGHTED == 0) return 1.0f;
-  return exp(-abs(difference) * PARAMETERS.support.x);
+  return exp(-abs(difference) * inverse_scale);
 }
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
@@ -188,6 +189,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
     if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, map)) return INVALID_COST;
   }
 
+  float inverse_scale = PARAMETERS.support.x;
   float of_patch = 0.0f;
   float n = 0.0f;
   float sum_a = 0.0f;
@@ -202,7 +204,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       float a = intensity_at(CONTEXT reference, q);
       if (a < 0.0f) continue;
       a -= centre_a;
-      float weight = sample_weight(CONTEXT a);
+      float weight = sample_weight(CONTEXT a, inverse_scale);
       of_patch += weight;
       vec2 position;
       if (WARP == WARP_EXACT) {

@@ -78,7 +78,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         float down = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y + 1));
         if (min(min(a, min(left, right)), min(up, down)) < 0.0f) continue;
         a -= centre;
-        float weight = sample_weight(CONTEXT a);
+        float weight = sample_weight(CONTEXT a, PARAMETERS.support.x);
         float slope = 0.5f * ((right - left) * direction.x + (down - up) * direction.y);
         information += weight * slope * slope;
         n += weight;

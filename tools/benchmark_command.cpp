@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "benchmark_measurement.h"
+#include "benchmark_plot.h"
 #include "commands.h"
-#include "progress_bar.h"
+#include "roofline.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/matcher.h"
@@ -21,112 +22,117 @@ struct BenchmarkArguments {
   std::vector<std::string> devices;
   std::vector<std::string> presets = {"fast", "quality"};
   std::vector<int> sizes = {256};
-  std::vector<int> window_radii = {5};
+  std::vector<int> window_radii;
   int runs = 3;
+  ws::DevicePeaks peaks;
   std::string output;
+  std::string plot;
   bool as_json = false;
 };
 
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
+void print_header(int runs) {
+  std::printf(
+      "Per depth map, on the demo scene: wall time (median [min max] of %d runs after one to warm "
+      "up, transfers\n"
+      "included) and device time in ms; work counted at full windows: samples of patches a pixel, "
+      "million samples,\n"
+      "10^9 FP32 operations of patches, 10^9 source texels and 10^9 bytes of maps a second of "
+      "device time.\n"
+      "roofline: the time that each kernel's operations, texels or bytes take at the device's "
+      "peak, whichever is\n"
+      "longest, summed: its share of the device time, and which it mostly is; - where no peak is "
+      "known\n"
+      "(CUDA devices state them; --peak-gflops, --peak-gtexels and --peak-gbps give others).\n"
+      "device     preset    size    r       wall                              device  samples/px "
+      "Msamples/s  Gflop/s  Gtexel/s   GB/s  roofline              MiB\n",
+      runs);
 }
 
-double device_milliseconds(const ws::StereoResult& result) {
-  double sum = 0;
-  for (const ws::KernelTime& time : result.times) sum += time.milliseconds;
-  return sum;
-}
-
-/// Everything measured of one configuration; all figures are per depth map, a pair giving two.
-Json measure(ws::Device& device, const ws::RenderedPair& pair, const ws::Options& options,
-             int runs) {
-  const std::vector<cv::Mat> images = {pair.views[0].image, pair.views[1].image};
-  ws::Matcher matcher(device, pair.rig, options);
-  ws::StereoResult result = matcher.match(images);  // warm-up: compiles pipelines
-  std::vector<double> wall;
-  std::vector<double> on_device;
-  const double maps = static_cast<double>(result.views.size());
-  for (int run = 0; run < runs; ++run) {
-    result = matcher.match(images);
-    wall.push_back(result.milliseconds / maps);
-    on_device.push_back(device_milliseconds(result) / maps);
+void print_row(const Measurement& m) {
+  const ws::KernelWork work = sum_of(m.kernels);
+  const Roofline least = roofline(m.kernels, m.device.peaks);
+  const double seconds = m.on_device / 1000;
+  char share[64] = "-";
+  if (least.milliseconds > 0) {
+    std::snprintf(share, sizeof share, "%.1f %% of %s", 100 * least.milliseconds / m.on_device,
+                  least.bound.c_str());
   }
-  const double samples = static_cast<double>(result.samples) / maps;
-  const double pixels = static_cast<double>(result.views[0].cost.total());
-  Json kernels;
-  for (const ws::KernelTime& time : result.times) kernels[time.kernel] = time.milliseconds / maps;
-  return {{"device", device.info().id},
-          {"name", device.info().name},
-          {"preset", options.preset},
-          {"size", pair.rig.views[0].camera.width},
-          {"window_radius", options.window_radius},
-          {"milliseconds", median(wall)},
-          {"milliseconds_min", *std::min_element(wall.begin(), wall.end())},
-          {"milliseconds_max", *std::max_element(wall.begin(), wall.end())},
-          {"device_milliseconds", median(on_device)},
-          {"samples_per_pixel", samples / pixels},
-          {"million_samples_per_second", samples / median(on_device) / 1000},
-          {"source_texels", 4 * samples},
-          {"device_bytes", result.device_bytes},
-          {"kernel_milliseconds", kernels}};
-}
-
-void print_row(const Json& row) {
-  std::printf("%-10s %-8s %5d %4d  %9.1f [%9.1f %9.1f]  %9.1f  %8.0f  %8.1f  %7.1f\n",
-              row["device"].get<std::string>().c_str(), row["preset"].get<std::string>().c_str(),
-              row["size"].get<int>(), row["window_radius"].get<int>(),
-              row["milliseconds"].get<double>(), row["milliseconds_min"].get<double>(),
-              row["milliseconds_max"].get<double>(), row["device_milliseconds"].get<double>(),
-              row["samples_per_pixel"].get<double>(),
-              row["million_samples_per_second"].get<double>(),
-              row["device_bytes"].get<double>() / (1 << 20));
+  std::printf(
+      "%-10s %-8s %5d %4d  %9.1f [%9.1f %9.1f]  %9.1f  %8.0f  %8.1f  %8.1f  %8.2f %6.1f  %-18s "
+      "%6.1f\n",
+      m.device.id.c_str(), m.preset.c_str(), m.size, m.window_radius, m.wall, m.wall_min,
+      m.wall_max, m.on_device, work.samples / m.pixels(), 1e-6 * work.samples / seconds,
+      1e-9 * work.operations / seconds, 1e-9 * work.texels / seconds, 1e-9 * work.bytes / seconds,
+      share, static_cast<double>(m.device_bytes) / (1 << 20));
   std::string shares;
-  double total = 0;  // of the run that the kernels' times are from
-  for (const auto& [kernel, time] : row["kernel_milliseconds"].items()) total += time.get<double>();
-  for (const auto& [kernel, time] : row["kernel_milliseconds"].items()) {
+  for (const ws::KernelTime& kernel : m.kernels) {
     char text[64];
-    std::snprintf(text, sizeof text, " %s %.0f %%", kernel.c_str(),
-                  100 * time.get<double>() / total);
+    std::snprintf(text, sizeof text, " %s %.0f %%", kernel.kernel.c_str(),
+                  100 * kernel.milliseconds / m.on_device);
     shares += text;
   }
   std::printf("           %s\n", shares.c_str());
   std::fflush(stdout);
 }
 
+PlotBar bar_of(const Measurement& m) {
+  const Roofline least = roofline(m.kernels, m.device.peaks);
+  return {m.device.id + "  " + m.preset + "  " + std::to_string(m.size) + " x " +
+              std::to_string(m.size),
+          m.wall,
+          m.wall_min,
+          m.wall_max,
+          m.on_device,
+          least.milliseconds,
+          least.bound};
+}
+
+/// Given peaks are one device's.
+void require_one_device(const BenchmarkArguments& a) {
+  const ws::DevicePeaks& given = a.peaks;
+  if (given.gflops <= 0 && given.gtexels <= 0 && given.gbps <= 0) return;
+  if (a.devices.size() == 1) return;
+  throw ws::Error("Peaks are those of one device; name it with --devices.");
+}
+
+void replace(ws::DevicePeaks& peaks, const ws::DevicePeaks& given) {
+  if (given.gflops > 0) peaks.gflops = given.gflops;
+  if (given.gtexels > 0) peaks.gtexels = given.gtexels;
+  if (given.gbps > 0) peaks.gbps = given.gbps;
+}
+
 void run_benchmark(BenchmarkArguments a) {
+  require_one_device(a);
   if (a.devices.empty()) {
     for (const ws::DeviceInfo& device : ws::Device::list()) {
       if (device.unusable.empty()) a.devices.push_back(device.id);
     }
   }
   Json rows = Json::array();
-  if (!a.as_json) {
-    std::printf(
-        "Per depth map, on the demo scene: wall time (median [min max] of %d runs after one to "
-        "warm "
-        "up, transfers\nincluded) and device time in ms; patch samples at full windows.\n"
-        "device     preset    size    r       wall                              device  samples/px "
-        "Msamples/s  MiB\n",
-        a.runs);
-  }
+  std::vector<PlotBar> bars;
+  if (!a.as_json) print_header(a.runs);
   for (const int size : a.sizes) {
     const ws::RenderedPair pair = ws::render_demo(size);
     for (const std::string& preset : a.presets) {
-      for (const int radius : a.window_radii) {
+      ws::Options options = ws::Options::preset_named(preset);
+      std::tie(options.min_distance, options.max_distance) = ws::demo_distance_range();
+      const std::vector<int> own = {options.window_radius};
+      for (const int radius : a.window_radii.empty() ? own : a.window_radii) {
+        options.window_radius = radius;
         for (const std::string& name : a.devices) {
-          ws::Options options = ws::Options::preset_named(preset);
-          std::tie(options.min_distance, options.max_distance) = ws::demo_distance_range();
-          options.window_radius = radius;
           ws::Device device = ws::Device::open(name);
-          rows.push_back(measure(device, pair, options, a.runs));
-          if (!a.as_json) print_row(rows.back());
+          Measurement measured = measure(device, pair, options, a.runs);
+          replace(measured.device.peaks, a.peaks);
+          if (!a.as_json) print_row(measured);
+          rows.push_back(json_of(measured));
+          bars.push_back(bar_of(measured));
         }
       }
     }
   }
   if (a.as_json) std::cout << rows.dump(2) << "\n";
   if (!a.output.empty()) ws::write_text(a.output, rows.dump(2) + "\n");
+  if (!a.plot.empty()) ws::write_text(a.plot, benchmark_plot(bars));
 }
 
 }  // namespace
@@ -145,14 +151,31 @@ void add_benchmark_command(CLI::App& app) {
       ->delimiter(',')
       ->check(CLI::Range(64, 4096))
       ->capture_default_str();
-  command->add_option("--window-radii", a->window_radii, "Patches of (2 r + 1)^2 pixels")
+  command
+      ->add_option("--window-radii", a->window_radii,
+                   "Patches of (2 r + 1)^2 pixels, the presets' own by default")
       ->delimiter(',')
-      ->check(CLI::Range(1, 15))
-      ->capture_default_str();
+      ->check(CLI::Range(1, 15));
   command->add_option("--runs", a->runs, "Timed runs of each")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  command
+      ->add_option("--peak-gflops", a->peaks.gflops,
+                   "The device's peak, 10^9 FP32 operations a second, a multiply-add being two")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--peak-gtexels", a->peaks.gtexels,
+                   "The device's peak, 10^9 texels of four bytes a second")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--peak-gbps", a->peaks.gbps,
+                   "The device's peak, 10^9 bytes a second to and from its memory")
+      ->check(CLI::PositiveNumber);
   command->add_option("-o,--output", a->output, "JSON file to write");
+  command->add_option("--plot", a->plot, "Picture to write, .svg")
+      ->check([](const std::string& name) -> std::string {
+        return name.ends_with(".svg") ? "" : "the picture is SVG; give a name that ends in .svg";
+      });
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_benchmark(*a); });
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "commands.h"
+#include "roofline.h"
 #include "widestereo/device.h"
 
 namespace {
@@ -19,7 +20,8 @@ void print_devices(bool as_json) {
                       {"type", device.type},
                       {"driver", device.driver},
                       {"uuid", device.uuid},
-                      {"unusable", device.unusable}});
+                      {"unusable", device.unusable},
+                      {"peaks", to_json(device.peaks)}});
       continue;
     }
     std::cout << std::left << std::setw(10) << device.id << device.name << "  [" << device.type

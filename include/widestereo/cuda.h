@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT
 // Matching inside a CUDA application: its stream, its device memory, no copies through the host.
 //
-//   widestereo::CudaMatcher matcher(rig, options);                       // once
+//   widestereo::CudaMatcher matcher(rig, options);        // once
 //   widestereo::CudaImage images[] = {{left, left_pitch}, {right, right_pitch}};
 //   widestereo::CudaViewMaps maps[2];
-//   maps[0].distance = {distance, distance_pitch};                       // what is left out is not
-//   written matcher.enqueue(images, maps, stream);                               // per frame;
-//   returns at once
+//   maps[0].distance = {distance, distance_pitch};        // what is left out is not written
+//   matcher.enqueue(images, maps, stream);                // per frame; returns at once
+//   matcher.enqueue_next(images, maps, stream, {motion}); // or from the planes of the frame before
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "widestereo/cuda_maps.h"
@@ -20,6 +22,20 @@
 struct CUstream_st;  // cudaStream_t is a pointer to it
 
 namespace widestereo {
+
+/// How a frame starts from the frame before it. What is given by value is fixed when it is
+/// enqueued, also in a graph that captures it; for a graph that is launched frame after frame, give
+/// the motion in device memory and leave the frame's number out.
+struct CudaWarmStart {
+  /// As WarmStart::now_from_previous; left out where unknown.
+  std::optional<Eigen::Isometry3d> now_from_previous = std::nullopt;
+  /// The first three rows of the same matrix, row after row (12 values), in device memory, instead:
+  /// read when the work runs.
+  const double* device_now_from_previous = nullptr;
+  /// As WarmStart::frame. Left out: counted on the device, 1 for the matcher's first warm start
+  /// that runs, then one more for each.
+  std::optional<int> frame = std::nullopt;
+};
 
 /// Matches images of one rig on an application's streams. Not thread-safe; frames of one matcher
 /// must follow each other: on one stream, or on several that wait for each other. Results equal a
@@ -46,6 +62,12 @@ class CudaMatcher {
   /// costs are 2.
   void enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                CUstream_st* stream);
+
+  /// The same for the next frame of a sequence, from the planes that the last frame enqueued leaves
+  /// on the device, as Matcher::match_next() does: a fraction of the work. Throws Error where no
+  /// frame was enqueued before. In a captured graph it starts from whatever ran before the graph.
+  void enqueue_next(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
+                    CUstream_st* stream, const CudaWarmStart& start = {});
 
   std::size_t device_bytes() const;
 

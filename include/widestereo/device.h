@@ -9,6 +9,13 @@ namespace widestereo {
 
 enum class DeviceKind { cpu, vulkan, cuda };
 
+/// What a device can do at most, as follows from its description; 0 where that is not known.
+struct DevicePeaks {
+  double gflops = 0;   ///< 10^9 single-precision operations a second, a multiply-add being two
+  double gtexels = 0;  ///< 10^9 texels of four bytes a second
+  double gbps = 0;     ///< 10^9 bytes a second to and from device memory
+};
+
 struct DeviceInfo {
   DeviceKind kind = DeviceKind::cpu;
   std::string id;        ///< what Device::open takes: "cpu", "vulkan:0", "cuda:0"
@@ -17,6 +24,7 @@ struct DeviceInfo {
   std::string driver;    ///< name and version, where known
   std::string uuid;      ///< 32 hexadecimal digits, empty for the CPU
   std::string unusable;  ///< why the device cannot be used, empty if it can
+  DevicePeaks peaks;     ///< known for CUDA devices only
 };
 
 struct DeviceRequest {

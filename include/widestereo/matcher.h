@@ -48,10 +48,24 @@ struct ViewResult {
   cv::Mat reasons;  ///< CV_16UC1, Reason bits; 0 = accepted
 };
 
+/// Work of a kernel, counted from the order of kernels and the parameters for comparing times with
+/// what a device can do: all pixels count, and all patches with full windows, so that a kernel may
+/// do somewhat less.
+struct KernelWork {
+  double samples = 0;  ///< patch samples, in each source view
+  /// Single-precision additions, multiplications, divisions, roots and elementary functions of the
+  /// patches; what else kernels compute is not counted.
+  double operations = 0;
+  double texels = 0;  ///< of source images that the samples blend, four each
+  /// What moves to and from memory if every launch reads and writes each pixel of its maps once.
+  double bytes = 0;
+};
+
 struct KernelTime {
   std::string kernel;
   int dispatches = 0;
   double milliseconds = 0;  ///< device time, summed
+  KernelWork work = {};     ///< likewise
 };
 
 struct StereoResult {

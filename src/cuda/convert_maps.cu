@@ -2,6 +2,7 @@
 // Compiled without fused multiply-add, so that values equal the host's.
 #include <cuda_runtime.h>
 
+#include <initializer_list>
 #include <type_traits>
 
 #include "cuda/convert_maps.h"
@@ -79,6 +80,44 @@ __global__ void export_pixel(ViewMemory view, CudaViewMaps maps, int height) {
   }
 }
 
+/// Row i of the product a b of two rigid transforms, 3x4 row-major.
+__device__ void multiply_row(const double* a, const double* b, int i, double* row) {
+  for (int j = 0; j < 4; ++j) {
+    row[j] = a[4 * i] * b[j] + a[4 * i + 1] * b[4 + j] + a[4 * i + 2] * b[8 + j];
+  }
+  row[3] += a[4 * i + 3];
+}
+
+/// The motion of a camera of a rig that moves.
+__device__ ViewPair pair_of(const double* now_from_previous, const double* rig_from_camera) {
+  double moved[12];
+  for (int i = 0; i < 3; ++i) multiply_row(now_from_previous, rig_from_camera, i, moved + 4 * i);
+  const double* r = rig_from_camera;
+  for (int i = 0; i < 3; ++i) moved[4 * i + 3] -= r[4 * i + 3];
+  // camera_from_rig: the transposed rotation of the difference from the camera's centre.
+  const double camera_from_rig[12] = {r[0], r[4], r[8], 0,    r[1],  r[5],
+                                      r[9], 0,    r[2], r[6], r[10], 0};
+  vec4 rows[3];
+  for (int i = 0; i < 3; ++i) {
+    double row[4];
+    multiply_row(camera_from_rig, moved, i, row);
+    rows[i] = vec4(static_cast<float>(row[0]), static_cast<float>(row[1]),
+                   static_cast<float>(row[2]), static_cast<float>(row[3]));
+  }
+  return {rows[0], rows[1], rows[2]};
+}
+
+/// One thread for each view.
+__global__ void start_views(FrameStart start, MatchParameters* parameters) {
+  const int view = static_cast<int>(threadIdx.x);
+  if (view >= start.views) return;
+  if (view == 0) parameters->frame.x = start.counted ? parameters->frame.x + 1 : start.frame;
+  parameters->pairs[view * MAX_VIEWS + view] =
+      start.now_from_previous != nullptr
+          ? pair_of(start.now_from_previous, start.rig_from_camera[view])
+          : start.pairs[view];
+}
+
 dim3 grid_of(int width, int height) {
   return dim3(static_cast<unsigned>((width + block_width - 1) / block_width),
               static_cast<unsigned>((height + block_height - 1) / block_height));
@@ -103,6 +142,24 @@ cudaError_t export_maps(const ViewMemory& view, const CudaViewMaps& maps, int he
   void* arguments[] = {&view_argument, &maps_argument, &height};
   return cudaLaunchKernel(reinterpret_cast<const void*>(&export_pixel), grid_of(view.width, height),
                           dim3(block_width, block_height), arguments, 0, stream);
+}
+
+cudaError_t start_frame(const FrameStart& start, MatchParameters* parameters, cudaStream_t stream) {
+  FrameStart start_argument = start;
+  void* arguments[] = {&start_argument, &parameters};
+  return cudaLaunchKernel(reinterpret_cast<const void*>(&start_views), dim3(1), dim3(MAX_VIEWS),
+                          arguments, 0, stream);
+}
+
+cudaError_t load_conversions() {
+  cudaFuncAttributes attributes{};
+  for (const void* kernel :
+       {reinterpret_cast<const void*>(&import_pixel), reinterpret_cast<const void*>(&export_pixel),
+        reinterpret_cast<const void*>(&start_views)}) {
+    const cudaError_t result = cudaFuncGetAttributes(&attributes, kernel);
+    if (result != cudaSuccess) return result;
+  }
+  return cudaSuccess;
 }
 
 }  // namespace widestereo

@@ -80,10 +80,10 @@ CudaBackend::~CudaBackend() {
   try {
     const CurrentDevice current = make_current();
     cudaStreamSynchronize(stream_.get());
-    graph_.reset();
+    prepared_.clear();
+    of_run_ = {};
     events_.clear();
     maps_.clear();
-    parameters_ = {};
     transfer_nearest_ = {};
     transfer_winner_ = {};
     stream_.reset();
@@ -113,14 +113,15 @@ void CudaBackend::make_maps() {
   }
   transfer_nearest_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
   transfer_winner_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
-  parameters_ = DeviceArray<kernel::MatchParameters>(1, target_.name, "the parameters");
+  of_run_.parameters = DeviceArray<kernel::MatchParameters>(1, target_.name, "the parameters");
   context_.transfer_nearest = transfer_nearest_.get();
   context_.transfer_winner = transfer_winner_.get();
-  context_.parameters = parameters_.get();
 }
 
 std::size_t CudaBackend::device_bytes() const {
-  std::size_t bytes = transfer_nearest_.bytes() + transfer_winner_.bytes() + parameters_.bytes();
+  std::size_t bytes =
+      transfer_nearest_.bytes() + transfer_winner_.bytes() + of_run_.parameters.bytes();
+  for (const Prepared& prepared : prepared_) bytes += prepared.parameters.bytes();
   for (const ViewMaps& maps : maps_) {
     bytes += maps.rays.bytes() + maps.intensities.bytes() + maps.hypotheses.bytes() +
              maps.checks.bytes() + maps.priors.bytes();
@@ -171,30 +172,31 @@ cv::Mat CudaBackend::checks(int view) {
   return download(maps_.at(static_cast<std::size_t>(view)).checks.get(), view);
 }
 
-void CudaBackend::set_parameters(const Schedule& schedule) {
+void CudaBackend::set_parameters(Prepared& prepared, const Schedule& schedule) {
   if (!(schedule.constants == constants_)) {
     throw Error(
         "The schedule was made for other kernel constants than this matcher; make a new one.");
   }
-  check(cudaMemcpyAsync(parameters_.get(), &schedule.parameters, sizeof schedule.parameters,
+  check(cudaMemcpyAsync(prepared.parameters.get(), &schedule.parameters, sizeof schedule.parameters,
                         cudaMemcpyHostToDevice, stream_.get()),
         "receive the parameters");
 }
 
-void CudaBackend::launch(const Schedule& schedule, const Band& band) {
+void CudaBackend::launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const {
   const Dispatch& dispatch = *band.dispatch;
   kernel::cuda::Context context = context_;
+  context.parameters = prepared.parameters.get();
   context.pass = dispatch.pass;
   context.pass.first_row = band.first_row;
   context.pass.last_row = band.last_row;
   const LaunchGrid grid =
       launch_grid(dispatch.width, band.last_row - band.first_row, dispatch.pass.colour);
   std::array<void*, 1> arguments = {&context};
-  check(cudaLaunchKernel(kernel_function(dispatch.kernel, schedule.constants),
-                         dim3(grid.columns, grid.rows),
-                         dim3(kernel::cuda::block_width, kernel::cuda::block_height),
-                         arguments.data(), 0, stream_.get()),
-        (std::string("launch the kernel ") + to_string(dispatch.kernel)).c_str());
+  check(
+      cudaLaunchKernel(kernel_function(dispatch.kernel, constants_), dim3(grid.columns, grid.rows),
+                       dim3(kernel::cuda::block_width, kernel::cuda::block_height),
+                       arguments.data(), 0, stream),
+      (std::string("launch the kernel ") + to_string(dispatch.kernel)).c_str());
 }
 
 std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {
@@ -203,7 +205,7 @@ std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {
                                         : std::numeric_limits<long long>::max());
 }
 
-void CudaBackend::launch_all(const Schedule& schedule, std::span<const Band> bands, Events events,
+void CudaBackend::launch_all(const Prepared& prepared, std::span<const Band> bands, Events events,
                              unsigned record_flags) {
   const auto record = [&] {
     if (events == Events::none) return;
@@ -221,7 +223,7 @@ void CudaBackend::launch_all(const Schedule& schedule, std::span<const Band> ban
     }
     if (band.first_row == 0) ++stretches_.back().dispatches;
     stretches_.back().samples += band.samples;
-    launch(schedule, band);
+    launch(prepared, band, stream_.get());
   }
   record();
 }
@@ -239,40 +241,37 @@ void CudaBackend::load_kernels(const Schedule& schedule, std::size_t events) {
   }
 }
 
-bool CudaBackend::graph_is_of(const Schedule& schedule, Events events) const {
-  return graph_ != nullptr && graph_events_ == events && same_launches(graph_schedule_, schedule);
-}
-
-void CudaBackend::make_graph(const Schedule& schedule, Events events) {
-  graph_.reset();
-  const std::vector<Band> bands = bands_of(schedule);
-  load_kernels(schedule, bands.size() + 1);  // nothing but launches while capturing
+void CudaBackend::make_graph(Prepared& prepared, Events events) {
+  prepared.graph.reset();
+  const std::vector<Band> bands = bands_of(prepared.schedule);
+  // Nothing but launches while capturing.
+  load_kernels(prepared.schedule, events == Events::none ? 0 : bands.size() + 1);
   Capture capture(stream_.get());
   check(capture.begin(), "begin a graph");
   // External: a node of the graph, so that each launch of the graph takes the time anew.
-  launch_all(schedule, bands, events, cudaEventRecordExternal);
+  launch_all(prepared, bands, events, cudaEventRecordExternal);
   const CudaGraph graph = capture.end();
   check(capture.result(), "capture a graph");
   cudaGraphExec_t exec = nullptr;
   check(cudaGraphInstantiateWithFlags(&exec, graph.get(), 0), "make a graph");
-  graph_.reset(exec);
-  graph_events_ = events;
-  graph_schedule_ = schedule;
+  prepared.graph.reset(exec);
 }
 
 void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
   const CurrentDevice current = make_current();
   times_.clear();
-  set_parameters(schedule);
+  set_parameters(of_run_, schedule);
   if (progress) {
     const std::vector<Band> bands = bands_of(schedule);
     load_kernels(schedule, bands.size() + 1);
-    launch_all(schedule, bands, Events::between_launches, cudaEventRecordDefault);
+    launch_all(of_run_, bands, Events::between_launches, cudaEventRecordDefault);
   } else {
-    if (!graph_is_of(schedule, Events::between_kernels)) {
-      make_graph(schedule, Events::between_kernels);
+    if (of_run_.graph == nullptr || !same_launches(of_run_.schedule, schedule)) {
+      of_run_.graph.reset();
+      of_run_.schedule = schedule;
+      make_graph(of_run_, Events::between_kernels);
     }
-    check(cudaGraphLaunch(graph_.get(), stream_.get()), "launch a match");
+    check(cudaGraphLaunch(of_run_.graph.get(), stream_.get()), "launch a match");
   }
   collect(schedule, progress);
 }
@@ -291,19 +290,36 @@ void CudaBackend::collect(const Schedule& schedule, const Matcher::Progress& pro
   }
 }
 
-void CudaBackend::prepare(const Schedule& schedule) {
+std::size_t CudaBackend::prepare(const Schedule& schedule) {
   const CurrentDevice current = make_current();
-  set_parameters(schedule);
-  if (!graph_is_of(schedule, Events::none)) make_graph(schedule, Events::none);
+  Prepared prepared;
+  prepared.schedule = schedule;
+  prepared.parameters = DeviceArray<kernel::MatchParameters>(1, target_.name, "the parameters");
+  // They were cleared on the default stream, which the others do not wait for.
+  check(cudaDeviceSynchronize(), "prepare a match");
+  set_parameters(prepared, schedule);
+  make_graph(prepared, Events::none);
   check(cudaStreamSynchronize(stream_.get()), "prepare a match");
+  prepared_.push_back(std::move(prepared));
+  return prepared_.size() - 1;
 }
 
-void CudaBackend::enqueue(cudaStream_t stream) {
+void CudaBackend::enqueue(std::size_t prepared, cudaStream_t stream) {
   const CurrentDevice current = make_current();
-  if (graph_ == nullptr || graph_events_ != Events::none) {
-    throw Error("Nothing was prepared for " + target_.name + "; call prepare() first.");
+  const Prepared& match = prepared_.at(prepared);
+  cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
+  // The default stream cannot capture, and must not be asked while another one does.
+  if (stream != nullptr) check(cudaStreamIsCapturing(stream, &status), "be asked for captures");
+  if (status == cudaStreamCaptureStatusNone) {
+    check(cudaGraphLaunch(match.graph.get(), stream), "launch a match");
+    return;
   }
-  check(cudaGraphLaunch(graph_.get(), stream), "launch a match");
+  // Launches of graphs cannot be captured, launches of kernels can.
+  for (const Band& band : bands_of(match.schedule)) launch(match, band, stream);
+}
+
+kernel::MatchParameters* CudaBackend::parameters(std::size_t prepared) const {
+  return prepared_.at(prepared).parameters.get();
 }
 
 }  // namespace widestereo

@@ -33,10 +33,13 @@ class CudaBackend final : public Backend {
   std::vector<KernelTime> times() const override { return times_.list(); }
   std::size_t device_bytes() const override;
 
-  /// Makes the graph that enqueue() launches; waits. run() replaces it.
-  void prepare(const Schedule& schedule);
-  /// Launches the prepared graph on a stream; waits for nothing and allocates nothing.
-  void enqueue(cudaStream_t stream);
+  /// Makes a schedule ready for enqueue(), with parameters of its own; waits. Returns its number.
+  std::size_t prepare(const Schedule& schedule);
+  /// Enqueues a prepared schedule; waits for nothing and allocates no device memory. Where the
+  /// stream captures, the kernels become nodes of what it captures.
+  void enqueue(std::size_t prepared, cudaStream_t stream);
+  /// Its parameters in device memory, for kernels that change them on the same stream.
+  kernel::MatchParameters* parameters(std::size_t prepared) const;
   /// Device memory of a view, for kernels that fill and read the maps on the same stream.
   const kernel::cuda::ViewMemory& memory(int view) const { return context_.views[view]; }
   cv::Size size(int view) const { return sizes_.at(static_cast<std::size_t>(view)); }
@@ -54,20 +57,25 @@ class CudaBackend final : public Backend {
     long long samples = 0;
   };
   enum class Events { none, between_kernels, between_launches };
+  /// A schedule's launches as one graph, which read parameters that may change.
+  struct Prepared {
+    Schedule schedule;
+    DeviceArray<kernel::MatchParameters> parameters;
+    CudaGraphExec graph;
+  };
 
   CurrentDevice make_current() const { return CurrentDevice(target_.ordinal, target_.name); }
   void check(cudaError_t result, const char* action) const;
   void make_maps();
   void upload(void* memory, int view, const cv::Mat& map, int type);
   cv::Mat download(const void* memory, int view);
-  void set_parameters(const Schedule& schedule);
+  void set_parameters(Prepared& prepared, const Schedule& schedule);
   std::vector<Band> bands_of(const Schedule& schedule) const;
   void load_kernels(const Schedule& schedule, std::size_t events);
-  void launch_all(const Schedule& schedule, std::span<const Band> bands, Events events,
+  void launch_all(const Prepared& prepared, std::span<const Band> bands, Events events,
                   unsigned record_flags);
-  void launch(const Schedule& schedule, const Band& band);
-  bool graph_is_of(const Schedule& schedule, Events events) const;
-  void make_graph(const Schedule& schedule, Events events);
+  void launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const;
+  void make_graph(Prepared& prepared, Events events);
   void collect(const Schedule& schedule, const Matcher::Progress& progress);
 
   CudaTarget target_;
@@ -77,13 +85,11 @@ class CudaBackend final : public Backend {
   std::vector<ViewMaps> maps_;
   DeviceArray<unsigned> transfer_nearest_;
   DeviceArray<unsigned> transfer_winner_;
-  DeviceArray<kernel::MatchParameters> parameters_;
-  kernel::cuda::Context context_{};  // all but the pass, which differs by launch
+  kernel::cuda::Context context_{};  // all but what differs by launch: pass and parameters
   std::vector<CudaEvent> events_;
   std::vector<Stretch> stretches_;  // of the last launch_all(): between events_ i and i + 1
-  CudaGraphExec graph_;
-  Schedule graph_schedule_;
-  Events graph_events_ = Events::none;
+  Prepared of_run_;                 // the last schedule of run()
+  std::vector<Prepared> prepared_;
   KernelTimes times_;
 };
 

@@ -5,6 +5,7 @@
 
 #include "cuda/architectures.h"
 #include "cuda/cuda_backend.h"
+#include "cuda/peaks.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -81,6 +82,13 @@ DeviceInfo describe_cuda_device(int index) {
   info.driver =
       "CUDA driver " + version_text(driver_version()) + ", compute capability " + capability;
   info.uuid = hexadecimal(properties.uuid);
+  // As attributes: CUDA 13 has no clocks among the properties.
+  info.peaks = peaks_of({.major = properties.major,
+                         .minor = properties.minor,
+                         .multiprocessors = attribute(cudaDevAttrMultiProcessorCount, index),
+                         .clock_khz = attribute(cudaDevAttrClockRate, index),
+                         .memory_clock_khz = attribute(cudaDevAttrMemoryClockRate, index),
+                         .bus_bits = attribute(cudaDevAttrGlobalMemoryBusWidth, index)});
   if (!runs_on(built_architectures(), properties.major, properties.minor)) {
     info.unusable = "This build has no kernels for compute capability " + capability +
                     " (only for " + built_architectures() +

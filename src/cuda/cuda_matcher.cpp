@@ -63,12 +63,40 @@ class CudaMatcher::Implementation {
         setup_(rig, options, DeviceKind::cuda),
         backend_(target_of(device), setup_.sizes, setup_.schedule.constants) {
     setup_.set_rays(backend_);
-    backend_.prepare(setup_.schedule);
+    cold_ = backend_.prepare(setup_.schedule);
+    warm_ = backend_.prepare(setup_.warm_schedule);
+    const CudaTarget& target = backend_.target();
+    const CurrentDevice current(target.ordinal, target.name);
+    check(load_conversions(), target.name, "load its kernels");
   }
 
   void enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                cudaStream_t stream) {
     require_fitting(images, maps);
+    enqueue_prepared(cold_, images, maps, stream);
+    holds_planes_ = true;
+  }
+
+  void enqueue_next(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
+                    cudaStream_t stream, const CudaWarmStart& start) {
+    if (!holds_planes_) {
+      throw Error(
+          "There are no planes of a previous frame to start from; enqueue one without a warm start "
+          "before.");
+    }
+    require_fitting(images, maps);
+    const CudaTarget& target = backend_.target();
+    const CurrentDevice current(target.ordinal, target.name);
+    check(start_frame(frame_start(start), backend_.parameters(warm_), stream), target.name,
+          "start a frame");
+    enqueue_prepared(warm_, images, maps, stream);
+  }
+
+  std::size_t device_bytes() const { return backend_.device_bytes(); }
+
+ private:
+  void enqueue_prepared(std::size_t prepared, std::span<const CudaImage> images,
+                        std::span<const CudaViewMaps> maps, cudaStream_t stream) {
     const CudaTarget& target = backend_.target();
     const CurrentDevice current(target.ordinal, target.name);
     for (std::size_t i = 0; i < images.size(); ++i) {
@@ -76,7 +104,7 @@ class CudaMatcher::Implementation {
       check(import_image(images[i], backend_.memory(view), backend_.size(view).height, stream),
             target.name, "read an image");
     }
-    backend_.enqueue(stream);
+    backend_.enqueue(prepared, stream);
     for (std::size_t i = 0; i < maps.size(); ++i) {
       const int view = static_cast<int>(i);
       check(export_maps(backend_.memory(view), maps[i], backend_.size(view).height, stream),
@@ -84,9 +112,23 @@ class CudaMatcher::Implementation {
     }
   }
 
-  std::size_t device_bytes() const { return backend_.device_bytes(); }
+  FrameStart frame_start(const CudaWarmStart& start) {
+    set_motion(setup_.warm_schedule, rig_,
+               start.now_from_previous.value_or(Eigen::Isometry3d::Identity()),
+               start.frame.value_or(0));
+    FrameStart result{};
+    result.views = static_cast<int>(rig_.views.size());
+    result.frame = start.frame.value_or(0);
+    result.counted = !start.frame.has_value();
+    result.now_from_previous = start.device_now_from_previous;
+    for (int i = 0; i < result.views; ++i) {
+      result.pairs[i] = setup_.warm_schedule.parameters.pairs[i * MAX_VIEWS + i];
+      Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(result.rig_from_camera[i]) =
+          rig_.views[static_cast<std::size_t>(i)].world_from_camera.matrix().topRows<3>();
+    }
+    return result;
+  }
 
- private:
   void require_fitting(std::span<const CudaImage> images,
                        std::span<const CudaViewMaps> maps) const {
     const std::size_t views = rig_.views.size();
@@ -111,6 +153,9 @@ class CudaMatcher::Implementation {
   Rig rig_;
   MatchSetup setup_;
   CudaBackend backend_;
+  std::size_t cold_ = 0;  // prepared
+  std::size_t warm_ = 0;
+  bool holds_planes_ = false;
 };
 
 CudaMatcher::CudaMatcher(const Rig& rig, const Options& options, int device)
@@ -122,6 +167,11 @@ CudaMatcher& CudaMatcher::operator=(CudaMatcher&&) noexcept = default;
 void CudaMatcher::enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                           CUstream_st* stream) {
   implementation_->enqueue(images, maps, stream);
+}
+void CudaMatcher::enqueue_next(std::span<const CudaImage> images,
+                               std::span<const CudaViewMaps> maps, CUstream_st* stream,
+                               const CudaWarmStart& start) {
+  implementation_->enqueue_next(images, maps, stream, start);
 }
 std::size_t CudaMatcher::device_bytes() const { return implementation_->device_bytes(); }
 

@@ -96,6 +96,10 @@ struct Algorithm {
     atomicMin(context.transfer_winner + transfer_index(CONTEXT p), index);
   }
 
+  /// Of weights and confidences, for which the hardware's precision does: two instructions of PTX
+  /// instead of eleven in the loop over a patch.
+  FN float exp(float a) { return __expf(a); }
+
   // The order matters.
   // clang-format off
 #include "random.glsl"
@@ -177,8 +181,9 @@ KernelTable for_model(int source_model, Get get) {
 struct PyramidKernels {
   template <class C>
   KernelTable operator()(C) const {
-    static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C), KERNEL_ENTRY(upsample, C),
+    static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C),  KERNEL_ENTRY(upsample, C),
                                           KERNEL_ENTRY(search, C), KERNEL_ENTRY(adopt, C),
+                                          KERNEL_ENTRY(check, C),  KERNEL_ENTRY(adopt_fill, C),
                                           KERNEL_ENTRY(renew, C)};
     return table_of(entries);
   }

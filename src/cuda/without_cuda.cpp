@@ -33,6 +33,8 @@ CudaMatcher::CudaMatcher(CudaMatcher&&) noexcept = default;
 CudaMatcher& CudaMatcher::operator=(CudaMatcher&&) noexcept = default;
 void CudaMatcher::enqueue(std::span<const CudaImage>, std::span<const CudaViewMaps>, CUstream_st*) {
 }
+void CudaMatcher::enqueue_next(std::span<const CudaImage>, std::span<const CudaViewMaps>,
+                               CUstream_st*, const CudaWarmStart&) {}
 std::size_t CudaMatcher::device_bytes() const { return 0; }
 
 }  // namespace widestereo

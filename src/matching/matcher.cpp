@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/matcher.h"
 
+#include <algorithm>
 #include <chrono>
 #include <opencv2/core.hpp>
 
 #include "kernel/maps.h"
 #include "matching/match_setup.h"
+#include "schedule/work.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -76,6 +78,20 @@ void unpack_checks(const cv::Mat& checks, ViewResult& result) {
   channels[3].convertTo(result.reasons, CV_16U);
 }
 
+void add_work(std::vector<KernelTime>& times, const Schedule& schedule) {
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    const auto time = std::find_if(times.begin(), times.end(), [&](const KernelTime& t) {
+      return t.kernel == to_string(dispatch.kernel);
+    });
+    if (time == times.end()) continue;
+    const KernelWork work = work_of(schedule, dispatch);
+    time->work.samples += work.samples;
+    time->work.operations += work.operations;
+    time->work.texels += work.texels;
+    time->work.bytes += work.bytes;
+  }
+}
+
 }  // namespace
 
 class Matcher::Implementation {
@@ -137,6 +153,7 @@ class Matcher::Implementation {
     require_overlap(result.views);
     for (const Dispatch& dispatch : schedule.dispatches) result.samples += dispatch.samples;
     result.times = backend_->times();
+    add_work(result.times, schedule);
     result.device_bytes = backend_->device_bytes();
     result.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

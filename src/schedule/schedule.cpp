@@ -224,12 +224,8 @@ class Builder {
     pass.last_row = camera.height;
     schedule_.dispatches.push_back(
         {kernel, pass, camera.width, camera.height,
-         pixels / (pass.colour < 0 ? 1 : 2) * patches * (views_of_rig_ - 1) * samples_of_patch()});
-  }
-
-  long long samples_of_patch() const {
-    const long long side = 2 * options_.window_radius + 1;
-    return options_.pattern == PatchPattern::checkerboard ? (side * side + 1) / 2 : side * side;
+         pixels / (pass.colour < 0 ? 1 : 2) * patches * (views_of_rig_ - 1) *
+             samples_of_patch(schedule_.constants.window_radius, schedule_.constants.pattern)});
   }
 
   void start_at_random(int view) { add(Kernel::initialise, pass_of(view), view, 1); }
@@ -406,6 +402,12 @@ const char* to_string(Kernel kernel) {
                                                                   "transfer_keep",
                                                                   "renew"};
   return names[static_cast<std::size_t>(kernel)];
+}
+
+long long samples_of_patch(int window_radius, int pattern) {
+  const long long side = 2 * window_radius + 1;
+  return pattern == static_cast<int>(PatchPattern::checkerboard) ? (side * side + 1) / 2
+                                                                 : side * side;
 }
 
 Schedule make_schedule(const Rig& rig, const Options& options) {

@@ -65,6 +65,9 @@ struct Schedule {
   std::vector<View> views;
 };
 
+/// Samples of a patch at its full window.
+long long samples_of_patch(int window_radius, int pattern);
+
 /// Throws Error when rig or options are invalid, or there are fewer than 2 or more than MAX_VIEWS
 /// views.
 Schedule make_schedule(const Rig& rig, const Options& options);

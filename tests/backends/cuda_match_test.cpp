@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -265,6 +266,137 @@ TEST(CudaApplication, MayCaptureAMatch) {
   CUDA_OK(cudaGraphExecDestroy(exec));
   CUDA_OK(cudaGraphDestroy(graph));
   CUDA_OK(cudaStreamDestroy(stream));
+}
+
+/// Three frames of the demo scene from a moving rig, and a CUDA application that matches them.
+class CudaSequence : public ::testing::Test {
+ protected:
+  static constexpr int side = 65;
+
+  CudaSequence()
+      : size_(side, side), left_(size_, CV_32FC1), right_(size_, CV_32FC1), maps_(size_) {
+    for (int k = 0; k < 3; ++k) {
+      const RenderedPair pair = render_demo_from(pose(k), side);
+      rig_ = pair.rig;
+      std::vector<cv::Mat>& images = frames_.emplace_back();
+      for (const RenderedView& view : pair.views)
+        images.push_back(to_intensity(view.image, "test"));
+    }
+    // Another frame of reference than camera 0, so that the cameras' poses in the rig count.
+    const Eigen::Isometry3d turned(Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 3).normalized()));
+    for (View& view : rig_.views) view.world_from_camera = turned * view.world_from_camera;
+    for (Eigen::Isometry3d* motion : {&motions_[0], &motions_[1]}) {
+      const int k = motion == &motions_[0] ? 1 : 2;
+      *motion = turned * pose(k).inverse() * pose(k - 1) * turned.inverse();
+    }
+  }
+
+  static Eigen::Isometry3d pose(int k) {
+    return Eigen::Translation3d(0.05 * k, -0.01 * k, 0.02 * k) *
+           Eigen::AngleAxisd(0.035 * k, Eigen::Vector3d(0.2, 1, 0.1).normalized());
+  }
+
+  void upload(int frame) {
+    left_.upload(frames_[static_cast<std::size_t>(frame)][0]);
+    right_.upload(frames_[static_cast<std::size_t>(frame)][1]);
+    cudaDeviceSynchronize();
+  }
+  std::array<CudaImage, 2> images() const {
+    return {left_.image(CudaPixel::intensity), right_.image(CudaPixel::intensity)};
+  }
+  std::array<CudaViewMaps, 2> outputs() const { return {maps_.maps(), CudaViewMaps{}}; }
+
+  /// What a Matcher finds in the frames, each but the first started from the one before.
+  std::vector<StereoResult> expected(Device& device, const Options& options) {
+    Matcher matcher(device, rig_, options);
+    std::vector<StereoResult> results = {matcher.match(frames_[0])};
+    for (int k = 1; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      results.push_back(
+          matcher.match_next(frames_[i], {.now_from_previous = motions_[i - 1], .frame = k}));
+    }
+    return results;
+  }
+
+  cv::Size size_;
+  Rig rig_;
+  std::vector<std::vector<cv::Mat>> frames_;
+  std::array<Eigen::Isometry3d, 2> motions_;
+  Pitched left_, right_;
+  DeviceMaps maps_;
+};
+
+TEST_F(CudaSequence, StartsFromTheLastFrameAsTheMatcherDoes) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda:0");
+  for (const Options& options : every_method()) {
+    const std::vector<StereoResult> results = expected(*device, options);
+    CudaMatcher matcher(rig_, options);
+    for (int repetition = 0; repetition < 2; ++repetition) {
+      upload(0);
+      matcher.enqueue(images(), outputs(), nullptr);
+      CUDA_OK(cudaDeviceSynchronize());
+      maps_.expect_equal(results[0].views[0]);
+      for (int k = 1; k < 3; ++k) {
+        upload(k);
+        const auto i = static_cast<std::size_t>(k);
+        CudaWarmStart start{.now_from_previous = motions_[i - 1]};
+        if (repetition > 0) start.frame = k;  // else it is counted
+        matcher.enqueue_next(images(), outputs(), nullptr, start);
+        CUDA_OK(cudaDeviceSynchronize());
+        maps_.expect_equal(results[i].views[0]);
+      }
+    }
+  }
+}
+
+TEST_F(CudaSequence, ACapturedWarmStartFollowsTheMotionAndCountsOn) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda:0");
+  const Options options = every_method()[0];
+  const std::vector<StereoResult> results = expected(*device, options);
+  CudaMatcher matcher(rig_, options);
+  upload(0);
+  matcher.enqueue(images(), outputs(), nullptr);
+  Pitched motion({12, 1}, CV_64FC1);
+  cudaStream_t stream = nullptr;
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t exec = nullptr;
+  CUDA_OK(cudaDeviceSynchronize());
+  CUDA_OK(cudaStreamCreate(&stream));
+  CUDA_OK(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal));
+  matcher.enqueue_next(images(), outputs(), stream,
+                       {.device_now_from_previous = motion.map<double>().data});
+  CUDA_OK(cudaStreamEndCapture(stream, &graph));
+  CUDA_OK(cudaGraphInstantiateWithFlags(&exec, graph, 0));
+  for (int k = 1; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    cv::Mat_<double> rows(1, 12);
+    for (int j = 0; j < 12; ++j) rows(0, j) = motions_[i - 1].matrix()(j / 4, j % 4);
+    motion.upload(rows);
+    upload(k);
+    CUDA_OK(cudaGraphLaunch(exec, stream));
+    CUDA_OK(cudaStreamSynchronize(stream));
+    // Motions are put together on the device, whose last bit may differ.
+    const cv::Mat difference = cv::abs(maps_.distance.download() - results[i].views[0].distance) >
+                               1e-3 * results[i].views[0].distance;
+    EXPECT_LT(cv::countNonZero(difference), side * side / 100) << k;
+  }
+  CUDA_OK(cudaGraphExecDestroy(exec));
+  CUDA_OK(cudaGraphDestroy(graph));
+  CUDA_OK(cudaStreamDestroy(stream));
+}
+
+TEST_F(CudaSequence, NeedsAFrameToStartFrom) {
+  OPEN_DEVICE_OR_SKIP(device, "cuda:0");
+  CudaMatcher matcher(rig_, every_method()[0]);
+  EXPECT_THAT(error_of([&] { matcher.enqueue_next(images(), outputs(), nullptr); }),
+              HasSubstr("no planes of a previous frame"));
+  upload(0);
+  matcher.enqueue(images(), outputs(), nullptr);
+  EXPECT_THAT(error_of([&] {
+                const CudaImage one[] = {left_.image(CudaPixel::intensity)};
+                matcher.enqueue_next(one, outputs(), nullptr);
+              }),
+              HasSubstr("2 views"));
 }
 
 TEST(CudaApplication, RefusesWhatDoesNotFit) {

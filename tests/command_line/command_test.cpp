@@ -172,10 +172,54 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
 }
 
+TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
+  const std::string common = "benchmark --devices cpu --presets fast --sizes 64 --runs 2 -o " +
+                             file("speed.json") + " --plot " + file("speed.svg");
+  const Outcome outcome = run(common + " --json --peak-gflops 1 --peak-gtexels 1000");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json rows = nlohmann::json::parse(outcome.output);
+  std::ifstream stream(folder_ / "speed.json");
+  EXPECT_EQ(nlohmann::json::parse(stream), rows);
+  ASSERT_EQ(rows.size(), 1u);
+  const nlohmann::json& row = rows[0];
+  EXPECT_EQ(row["window_radius"], 4);
+  EXPECT_LE(row["milliseconds_min"], row["milliseconds"]);
+  EXPECT_LE(row["milliseconds"], row["milliseconds_max"]);
+  EXPECT_EQ(row["peaks"]["gflops"], 1.0);
+  EXPECT_TRUE(row["peaks"]["gbps"].is_null());
+  const nlohmann::json& all = row["on_device"];
+  const double operations = all["operations"];
+  EXPECT_GT(operations, 30 * all["samples"].get<double>());
+  EXPECT_EQ(all["texels"].get<double>(), 4 * all["samples"].get<double>());
+  EXPECT_NEAR(all["samples"].get<double>(), row["samples_per_pixel"].get<double>() * 64 * 64, 1);
+  // At 1 Gflop/s and so many texels, operations take longest in every kernel that has any.
+  EXPECT_EQ(all["roofline_bound"], "operations");
+  EXPECT_NEAR(all["roofline_milliseconds"].get<double>(), operations / 1e6, operations / 1e12);
+  EXPECT_NEAR(all["roofline_share"].get<double>(), all["gflops"].get<double>(), 1e-6);
+  EXPECT_EQ(row["kernels"]["search"]["roofline_bound"], "operations");
+  EXPECT_TRUE(row["kernels"]["regress"]["roofline_share"].is_null());
+  double sum = 0;
+  for (const nlohmann::json& kernel : row["kernels"]) sum += kernel["operations"].get<double>();
+  EXPECT_NEAR(sum, operations, 1);
+
+  std::ifstream svg(folder_ / "speed.svg");
+  const std::string picture{std::istreambuf_iterator<char>(svg), {}};
+  EXPECT_NE(picture.find("cpu  fast  64 x 64"), std::string::npos);
+  EXPECT_NE(picture.find("% of operations"), std::string::npos);
+  EXPECT_EQ(picture.substr(picture.size() - 7), "</svg>\n");
+
+  const Outcome unknown = run("benchmark --devices cpu --presets fast --sizes 64 --runs 1");
+  EXPECT_EQ(unknown.exit_code, 0) << unknown.output;
+  EXPECT_EQ(unknown.output.find("% of"), std::string::npos) << unknown.output;
+  expect_error("benchmark --sizes 64 --peak-gbps 10", "--devices");
+  EXPECT_NE(run("benchmark --sizes 64 --plot " + file("speed.png")).exit_code, 0);
+}
+
 TEST_F(Command, HelpAndVersion) {
-  for (const char* arguments : {"--help", "demo --help", "depth --help", "sequence --help",
-                                "evaluate --help", "calibration --help", "calibration show --help",
-                                "devices --help", "--version", "devices", "devices --json"}) {
+  for (const char* arguments :
+       {"--help", "demo --help", "depth --help", "sequence --help", "evaluate --help",
+        "calibration --help", "calibration show --help", "devices --help", "benchmark --help",
+        "--version", "devices", "devices --json"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << outcome.output;
     EXPECT_FALSE(outcome.output.empty());

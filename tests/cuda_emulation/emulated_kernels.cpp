@@ -50,6 +50,9 @@ ThreadFunction bind_kernel(const void* function, void** arguments) {
   if (function == reinterpret_cast<const void*>(&export_pixel)) {
     return bind(&export_pixel, arguments);
   }
+  if (function == reinterpret_cast<const void*>(&start_views)) {
+    return bind(&start_views, arguments);
+  }
   if (!is_kernel_of_the_schedule(function)) return {};
   using Kernel = void (*)(Context);
   return bind(reinterpret_cast<Kernel>(reinterpret_cast<std::uintptr_t>(function)), arguments);

@@ -149,6 +149,11 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
 }
 cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int) {
   *value = 0;
+  // An H200's.
+  if (attribute == cudaDevAttrClockRate) *value = 1980000;
+  if (attribute == cudaDevAttrMultiProcessorCount) *value = 132;
+  if (attribute == cudaDevAttrMemoryClockRate) *value = 3201000;
+  if (attribute == cudaDevAttrGlobalMemoryBusWidth) *value = 6144;
   if (attribute == cudaDevAttrComputeMode) *value = emulation().compute_mode;
   if (attribute == cudaDevAttrKernelExecTimeout) *value = emulation().time_limit ? 1 : 0;
   return cudaSuccess;
@@ -262,6 +267,12 @@ cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
   ++emulation().live_objects;
   return cudaSuccess;
 }
+cudaError_t cudaStreamIsCapturing(cudaStream_t stream, cudaStreamCaptureStatus* status) {
+  if (stream == nullptr && anything_captures()) return cudaErrorStreamCaptureUnsupported;
+  *status = stream != nullptr && stream->capturing != nullptr ? cudaStreamCaptureStatusActive
+                                                              : cudaStreamCaptureStatusNone;
+  return step();
+}
 cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
   *graph = std::exchange(stream->capturing, nullptr);
   if (*graph == nullptr) return cudaErrorInvalidValue;
@@ -285,6 +296,7 @@ cudaError_t cudaGraphInstantiateWithFlags(cudaGraphExec_t* exec, cudaGraph_t gra
   return cudaSuccess;
 }
 cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
+  if (resolve(stream)->capturing != nullptr) return cudaErrorStreamCaptureUnsupported;
   if (const cudaError_t error = step()) return error;
   for (const Work& node : exec->nodes) enqueue(stream, node);
   return cudaSuccess;

@@ -49,6 +49,7 @@ class CudaEmulation : public ::testing::Test {
     const CudaViewMaps maps[2] = {};
     matcher.enqueue(images, maps, nullptr);
     matcher.enqueue(images, maps, nullptr);
+    matcher.enqueue_next(images, maps, nullptr);
     cudaDeviceSynchronize();
   }
 
@@ -159,7 +160,11 @@ TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
   matcher.enqueue(images, maps, nullptr);
   const int live = emulation().live_objects;
   const int kernels = emulation().kernels_run;
-  for (int i = 0; i < 3; ++i) matcher.enqueue(images, maps, nullptr);
+  for (int i = 0; i < 3; ++i) {
+    matcher.enqueue(images, maps, nullptr);
+    matcher.enqueue_next(images, maps, nullptr);
+    matcher.enqueue_next(images, maps, nullptr, {.frame = i});
+  }
   EXPECT_EQ(emulation().live_objects, live);
   EXPECT_EQ(emulation().kernels_run, kernels);  // nothing has waited
   cudaDeviceSynchronize();
@@ -187,6 +192,15 @@ TEST_F(CudaEmulation, DevicesAreFoundByIndexNameAndUuid) {
   EXPECT_EQ(Device::open("auto").info().id, "cuda:0");
   EXPECT_EQ(Device::list().front().id, "cuda:0");
   EXPECT_THAT(error_of([] { Device::open("cuda:7"); }), HasSubstr("cuda:1 (Emulated GPU)"));
+}
+
+TEST_F(CudaEmulation, DevicesStateTheirPeaks) {
+  const DevicePeaks h200 = Device::open("cuda").info().peaks;
+  EXPECT_NEAR(h200.gflops, 66908, 1);  // as NVIDIA's data sheet: 67 TFLOP/s
+  EXPECT_NEAR(h200.gtexels, 8363, 1);
+  EXPECT_NEAR(h200.gbps, 4917, 1);  // ... 4.8 TB/s
+  emulation().major = 99;
+  EXPECT_EQ(list_cuda_devices(nullptr)[0].peaks.gflops, 0) << "lanes unknown";
 }
 
 TEST_F(CudaEmulation, UnusableDevicesSayWhy) {

@@ -2,6 +2,8 @@
 // What device code needs to run on the CPU, one thread after the other.
 #pragma once
 
+#include <math.h>
+
 #include "cuda_runtime_api.h"
 
 #define __device__
@@ -18,6 +20,9 @@ template <class T>
 T __ldg(const T* address) {
   return *address;
 }
+
+// As the hardware, by a power of two; glibc has a function of the same name.
+#define __expf(a) ::exp2f(1.442695041f * (a))
 
 inline unsigned atomicMax(unsigned* address, unsigned value) {
   unsigned seen = __atomic_load_n(address, __ATOMIC_RELAXED);

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+#include "schedule/work.h"
+
+#include <array>
+#include <bit>
+
+namespace widestereo {
+namespace {
+
+// Counted by hand in the shaders' functions of these names; tests/kernel/work_test.cpp counts them
+// again by running the functions with numbers that count.
+constexpr int side_of_source = 21;  // a rotation, a scalar product and a sum
+constexpr int warp_ray_before_projection = 26;
+constexpr int is_ray = 5;  // a squared length, in warp_pixel()
+constexpr int sample_image = 11;
+constexpr int map_offset_affine = 8;
+constexpr int map_offset_quadratic = 23;
+constexpr int map_axis = 15;
+constexpr int map_corners = 9;
+constexpr int weight_of_sample = 2;  // a product and an exponential
+constexpr int zncc_cost = 15;        // and the visible share's limit
+
+/// Of project(); sources of several models count as pinholes, which take least.
+int projection(int model) {
+  constexpr int common = 7;       // the length, and the field of view's limit
+  constexpr int perspective = 2;  // two divisions
+  constexpr int distortion = 29;
+  constexpr int to_pixels = 6;
+  switch (static_cast<CameraModel>(model)) {
+    case CameraModel::pinhole_radtan:
+      return common + perspective + distortion + to_pixels;
+    case CameraModel::kannala_brandt:
+      return common + 15 + to_pixels;
+    case CameraModel::double_sphere:
+      return common + 10 + perspective + to_pixels;
+    case CameraModel::unified:
+      return common + 3 + perspective + to_pixels;
+    case CameraModel::extended_unified:
+      return common + 9 + perspective + to_pixels;
+    case CameraModel::field_of_view:
+      return common + 7 + to_pixels;
+    case CameraModel::mei:
+      return common + 3 + perspective + distortion + to_pixels;
+    case CameraModel::pinhole:
+      break;
+  }
+  return common + perspective + to_pixels;
+}
+
+/// Bytes of a pixel that a kernel reads or writes at least once, of these maps.
+enum Map : unsigned {
+  ray = 1,
+  intensity = 2,
+  plane = 4,
+  checks = 8,
+  prior = 16,
+  nearest = 32,
+  winner = 64,
+  half_of_planes = 128,     // one colour's
+  quarter_of_planes = 256,  // the coarser level's
+  finer_intensities = 512,
+};
+
+int bytes_of(unsigned maps) {
+  constexpr std::array<int, 10> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16};
+  int sum = 0;
+  for (unsigned i = 0; i < bytes.size(); ++i) {
+    if ((maps >> i & 1) != 0) sum += bytes[i];
+  }
+  return sum;
+}
+
+struct Traffic {
+  unsigned read = 0;
+  unsigned read_in_sources = 0;
+  unsigned written = 0;
+};
+
+Traffic traffic_of(const Dispatch& dispatch) {
+  constexpr unsigned seen = ray | intensity;
+  const bool patches = dispatch.samples > 0;
+  const unsigned of_patches = patches ? seen : 0;
+  const unsigned in_sources = patches ? static_cast<unsigned>(intensity) : 0;
+  switch (dispatch.kernel) {
+    case Kernel::initialise:
+      return {seen, intensity, plane};
+    case Kernel::iterate:
+      return {seen | plane, intensity, half_of_planes};
+    case Kernel::iterate_raster:
+      return {seen | plane, intensity, plane};
+    case Kernel::transfer_clear:
+      return {0, 0, nearest | winner};
+    case Kernel::transfer_nearest:
+      return {ray | plane, 0, nearest};
+    case Kernel::transfer_winner:
+      return {ray | plane | nearest, 0, winner};
+    case Kernel::transfer_gather:
+      return {seen | winner | plane, intensity, plane};
+    case Kernel::check:
+      return {seen | plane, plane | in_sources, checks};
+    case Kernel::downsample:
+      return {finer_intensities, 0, intensity};
+    case Kernel::sweep:
+      return {seen, intensity, plane};
+    case Kernel::upsample:
+      return {seen | quarter_of_planes, intensity, plane};
+    case Kernel::search:
+      return {seen | plane, intensity, half_of_planes};
+    case Kernel::measure:
+      return {seen | plane, plane, checks};
+    case Kernel::regress:
+      return {seen | plane | checks, 0, prior};
+    case Kernel::adopt:
+      return {prior | plane | of_patches, in_sources, plane};
+    case Kernel::fill:
+      return {seen | plane | checks, 0, prior};
+    case Kernel::adopt_fill:
+      return {prior | checks | seen, intensity, plane | checks};
+    case Kernel::transfer_keep:
+      return {ray | winner | plane, 0, prior};
+    case Kernel::renew:
+      return {seen | prior, intensity, plane};
+  }
+  return {};
+}
+
+}  // namespace
+
+PatchOperations patch_operations(const KernelConstants& c) {
+  const bool exact = c.warp == static_cast<int>(PatchWarp::exact);
+  const bool quadratic = c.warp == static_cast<int>(PatchWarp::quadratic);
+  const int weighting = c.weighted != 0 ? weight_of_sample : 0;
+  const int warp_ray = warp_ray_before_projection + projection(c.source_model);
+  const int map_offset = quadratic ? map_offset_quadratic : map_offset_affine;
+  // Two differences from the centre, two sums of weights, five of intensities and their products.
+  const int sums = 2 + 2 + 8 + (c.weighted != 0 ? 2 : 0);
+  PatchOperations operations;
+  operations.of_sample = weighting + (exact ? warp_ray : map_offset) + sample_image + sums;
+  operations.of_patch = side_of_source + is_ray + warp_ray + sample_image + zncc_cost;
+  if (!exact) {
+    const int anchors = quadratic ? 8 : 4;
+    operations.of_patch += anchors * (is_ray + warp_ray) + 2 * map_axis;
+  }
+  if (quadratic) operations.of_patch += map_corners;
+  return operations;
+}
+
+KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
+  const PatchOperations operations = patch_operations(schedule.constants);
+  const auto samples = static_cast<double>(dispatch.samples);
+  const double patches =
+      samples / static_cast<double>(
+                    samples_of_patch(schedule.constants.window_radius, schedule.constants.pattern));
+  const double pixels = static_cast<double>(dispatch.width) * dispatch.height;
+  const Traffic traffic = traffic_of(dispatch);
+  const int sources = std::popcount(dispatch.pass.sources);
+  return {.samples = samples,
+          .operations = samples * operations.of_sample + patches * operations.of_patch,
+          .texels = 4 * samples,
+          .bytes = pixels * (bytes_of(traffic.read) + bytes_of(traffic.written) +
+                             sources * bytes_of(traffic.read_in_sources))};
+}
+
+}  // namespace widestereo

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// The counted work of a schedule against what the shared source does when it runs.
+#include "schedule/work.h"
+
+#include <gtest/gtest.h>
+
+#include "counting_kernels.h"
+
+namespace widestereo::test {
+namespace {
+
+Camera camera_of(CameraModel model) {
+  Camera camera = fisheye_camera(96, 1.2);
+  camera.model = model;
+  camera.xi = model == CameraModel::double_sphere ? -0.17 : 0.8;
+  camera.alpha = 0.59;
+  camera.beta = 1.1;
+  camera.omega = 0.9;
+  return camera;
+}
+
+/// What evaluating one patch that the source sees whole takes.
+counting::Counts run_patch(const Options& options, CameraModel model) {
+  Rig rig = fisheye_rig(96);
+  for (View& view : rig.views) view.camera = camera_of(model);
+  KernelFixture fixture(rig, options);
+  fixture.set_reference(0);
+  const counting::Context context{
+      counting::numbers<counting::MatchParameters>(fixture.schedule().parameters),
+      counting::numbers<counting::PassParameters>(fixture.pass()), fixture.schedule().constants,
+      fixture.context()};
+  counting::counts = {};
+  const counting::Number cost =
+      counting::source_cost(context, 1, {48, 49}, counting::vec3(0.1f, 0.05f, 0.4f));
+  EXPECT_LT(cost.value, INVALID_COST);
+  return counting::counts;
+}
+
+TEST(Work, OfAPatchIsWhatRunningItTakes) {
+  for (int model = 0; model < 8; ++model) {
+    for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
+      for (const double weight_scale : {0.0, 12.0}) {
+        for (const PatchPattern pattern : {PatchPattern::dense, PatchPattern::checkerboard}) {
+          SCOPED_TRACE(testing::Message() << model << static_cast<int>(warp) << weight_scale);
+          Options options;
+          options.warp = warp;
+          options.weight_scale = weight_scale;
+          options.pattern = pattern;
+          options.window_radius = 3;
+          const counting::Counts run = run_patch(options, static_cast<CameraModel>(model));
+          const KernelConstants constants{.source_model = model,
+                                          .window_radius = 3,
+                                          .warp = static_cast<int>(warp),
+                                          .pattern = static_cast<int>(pattern),
+                                          .weighted = weight_scale > 0 ? 1 : 0};
+          const long long samples = samples_of_patch(3, static_cast<int>(pattern));
+          const PatchOperations expected = patch_operations(constants);
+          // Two products with the weight, which compilers leave out where it is one.
+          const long long left_out = weight_scale > 0 ? 0 : 2 * samples;
+          EXPECT_EQ(run.operations - left_out, expected.of_sample * samples + expected.of_patch);
+          EXPECT_EQ(run.texels, 4 * (samples + 1));  // and the centre's
+        }
+      }
+    }
+  }
+}
+
+TEST(Work, OfAScheduleAddsUp) {
+  Options options = Options::preset_named("paper");
+  options.first_iterations = 1;
+  options.second_iterations = 0;
+  const Schedule schedule = make_schedule(fisheye_rig(64), options);
+  const Dispatch& iterate = schedule.dispatches[1];
+  ASSERT_EQ(iterate.kernel, Kernel::iterate);
+  const KernelWork work = work_of(schedule, iterate);
+  constexpr double pixels = 64 * 64;
+  EXPECT_EQ(work.samples, pixels / 2 * 8 * 121);
+  EXPECT_EQ(work.texels, 4 * work.samples);
+  const PatchOperations of = patch_operations(schedule.constants);
+  EXPECT_EQ(work.operations, pixels / 2 * 8 * (121 * of.of_sample + of.of_patch));
+  // Rays, both images and all planes read, one colour's planes written.
+  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 4 + 16) + pixels / 2 * 16);
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    EXPECT_GT(work_of(schedule, dispatch).bytes, 0) << to_string(dispatch.kernel);
+  }
+}
+
+}  // namespace
+}  // namespace widestereo::test

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MIT
+#include "benchmark_measurement.h"
+
+#include <algorithm>
+
+#include "roofline.h"
+
+namespace ws = widestereo;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+double device_milliseconds(const std::vector<ws::KernelTime>& kernels) {
+  double sum = 0;
+  for (const ws::KernelTime& kernel : kernels) sum += kernel.milliseconds;
+  return sum;
+}
+
+std::vector<ws::KernelTime> per_map(std::vector<ws::KernelTime> kernels, std::size_t maps) {
+  const double share = 1.0 / static_cast<double>(maps);
+  for (ws::KernelTime& kernel : kernels) {
+    ws::KernelWork& work = kernel.work;
+    for (double* sum :
+         {&kernel.milliseconds, &work.samples, &work.operations, &work.texels, &work.bytes}) {
+      *sum *= share;
+    }
+  }
+  return kernels;
+}
+
+/// Work, what was reached of it in a second, and the share of the roofline, null where unknown.
+Json json_of(const ws::KernelWork& work, double milliseconds, const Roofline& least) {
+  const auto giga_per_second = [milliseconds](double amount) {
+    return milliseconds > 0 ? 1e-6 * amount / milliseconds : 0;
+  };
+  Json json = {{"milliseconds", milliseconds},
+               {"samples", work.samples},
+               {"operations", work.operations},
+               {"texels", work.texels},
+               {"bytes", work.bytes},
+               {"gflops", giga_per_second(work.operations)},
+               {"gtexels", giga_per_second(work.texels)},
+               {"gbps", giga_per_second(work.bytes)},
+               {"roofline_milliseconds", nullptr},
+               {"roofline_bound", nullptr},
+               {"roofline_share", nullptr}};
+  if (least.milliseconds > 0 && milliseconds > 0) {
+    json["roofline_milliseconds"] = least.milliseconds;
+    json["roofline_bound"] = least.bound;
+    json["roofline_share"] = least.milliseconds / milliseconds;
+  }
+  return json;
+}
+
+}  // namespace
+
+ws::KernelWork sum_of(const std::vector<ws::KernelTime>& kernels) {
+  ws::KernelWork sum;
+  for (const ws::KernelTime& kernel : kernels) {
+    sum.samples += kernel.work.samples;
+    sum.operations += kernel.work.operations;
+    sum.texels += kernel.work.texels;
+    sum.bytes += kernel.work.bytes;
+  }
+  return sum;
+}
+
+Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::Options& options,
+                    int runs) {
+  const std::vector<cv::Mat> images = {pair.views[0].image, pair.views[1].image};
+  ws::Matcher matcher(device, pair.rig, options);
+  matcher.match(images);  // warm-up: compiles pipelines
+  std::vector<ws::StereoResult> results;
+  for (int run = 0; run < runs; ++run) {
+    results.push_back(matcher.match(images));
+    results.back().views.clear();  // the maps are not needed
+  }
+  const auto maps = images.size();
+  std::vector<double> wall;
+  for (const ws::StereoResult& result : results) {
+    wall.push_back(result.milliseconds / static_cast<double>(maps));
+  }
+  std::sort(wall.begin(), wall.end());
+  const auto middle = results.begin() + static_cast<std::ptrdiff_t>(results.size() / 2);
+  std::nth_element(results.begin(), middle, results.end(), [](const auto& a, const auto& b) {
+    return device_milliseconds(a.times) < device_milliseconds(b.times);
+  });
+  Measurement m;
+  m.device = device.info();
+  m.preset = options.preset;
+  m.size = pair.rig.views[0].camera.width;
+  m.window_radius = options.window_radius;
+  m.wall = wall[wall.size() / 2];
+  m.wall_min = wall.front();
+  m.wall_max = wall.back();
+  m.kernels = per_map(middle->times, maps);
+  m.on_device = device_milliseconds(m.kernels);
+  m.device_bytes = middle->device_bytes;
+  return m;
+}
+
+Json json_of(const Measurement& m) {
+  const ws::DevicePeaks& peaks = m.device.peaks;
+  const ws::KernelWork work = sum_of(m.kernels);
+  Json kernels;
+  for (const ws::KernelTime& kernel : m.kernels) {
+    kernels[kernel.kernel] =
+        json_of(kernel.work, kernel.milliseconds, roofline(kernel.work, peaks));
+    kernels[kernel.kernel]["dispatches"] = kernel.dispatches;
+  }
+  return {{"device", m.device.id},
+          {"name", m.device.name},
+          {"preset", m.preset},
+          {"size", m.size},
+          {"window_radius", m.window_radius},
+          {"milliseconds", m.wall},
+          {"milliseconds_min", m.wall_min},
+          {"milliseconds_max", m.wall_max},
+          {"samples_per_pixel", work.samples / m.pixels()},
+          {"million_samples_per_second", work.samples / m.on_device / 1000},
+          {"device_bytes", m.device_bytes},
+          {"peaks", to_json(peaks)},
+          {"on_device", json_of(work, m.on_device, roofline(m.kernels, peaks))},
+          {"kernels", kernels}};
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "widestereo/matcher.h"
+#include "widestereo/synthesis.h"
+
+/// One configuration, everything per depth map; a pair gives two.
+struct Measurement {
+  widestereo::DeviceInfo device;
+  std::string preset;
+  int size = 0;
+  int window_radius = 0;
+  double wall = 0, wall_min = 0, wall_max = 0;  // milliseconds, the first a median
+  double on_device = 0;                         // of the median run, which the kernels are of
+  std::vector<widestereo::KernelTime> kernels;
+  std::size_t device_bytes = 0;
+
+  double pixels() const { return static_cast<double>(size) * size; }
+};
+
+/// Matches the pair once to warm up, then `runs` times.
+Measurement measure(widestereo::Device& device, const widestereo::RenderedPair& pair,
+                    const widestereo::Options& options, int runs);
+
+widestereo::KernelWork sum_of(const std::vector<widestereo::KernelTime>& kernels);
+
+/// All of it, also kernel by kernel, with the rates reached and shares of the roofline.
+nlohmann::ordered_json json_of(const Measurement& measurement);
