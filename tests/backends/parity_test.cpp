@@ -141,8 +141,8 @@ TEST_P(Parity, PyramidMatchAgrees) {
     const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
     const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
     for (int view = 0; view < 2; ++view) {
-      // 4 % is a few hundredths of a pixel here; repair, which decides, amplifies rounding.
-      expect_agreement(expected.views[view], actual.views[view], 0.04);
+      // At depth edges, of which so small an image has many, thresholds amplify rounding.
+      expect_agreement(expected.views[view], actual.views[view], 0.03);
     }
   }
   expect_no_validation_messages(*device);

@@ -69,9 +69,10 @@ TEST_P(WarmStarts, ReachColdAccuracyWithAQuarterOfTheWork) {
     EXPECT_LE(4 * result.samples, cold.samples);
     const RegionScores scores = scores_of(result, frame(k));
     const RegionScores expected = scores_of(cold, frame(k));
-    // Cold frames are repaired, which shows in so small an image.
-    EXPECT_LT(scores.bad_relative.at(0.02), expected.bad_relative.at(0.02) + 0.03) << k;
+    EXPECT_LT(scores.bad_relative.at(0.02), expected.bad_relative.at(0.02) + 0.02) << k;
     EXPECT_LT(scores.bad_pixels.at(1.0), expected.bad_pixels.at(1.0) + 0.02) << k;
+    // Planes stay where the other view cuts their patches off.
+    EXPECT_GT(scores.completeness, expected.completeness - 0.001) << k;
   }
   expect_no_validation_messages(*device);
 }
