@@ -23,7 +23,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-// The settings that score best over the sets of docs/accuracy.md. Nothing is rejected but for the
+// The best of the settings tried on the sets of docs/accuracy.md. Nothing is rejected but by the
 // left-right check, because empty pixels count as bad.
 constexpr double scale_of_fisheye = 1.25;  ///< samples for each of the fisheye's, across its field
 constexpr int block_side = 5;              ///< pixels
@@ -111,8 +111,12 @@ class EpipolarSphere {
 
 /// 8-bit grey levels, black where the view's mask excludes.
 cv::Mat grey_levels(const std::string& file, const ws::View& view) {
+  const cv::Mat image = ws::read_image(file);
+  if (image.cols != view.camera.width || image.rows != view.camera.height) {
+    throw ws::Error(file + " has another size than the calibration of " + view.name + ".");
+  }
   cv::Mat grey;
-  ws::to_intensity(ws::read_image(file), file).convertTo(grey, CV_8U, 255);
+  ws::to_intensity(image, file).convertTo(grey, CV_8U, 255);
   if (!view.mask.empty()) grey.setTo(0, view.mask == 0);
   return grey;
 }
