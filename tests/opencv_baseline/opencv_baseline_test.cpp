@@ -27,7 +27,7 @@ TEST(OpenCvBaseline, IsRightAtMostPixelsOfTheDemoScene) {
   const std::vector<RegionScores> scores =
       evaluate(distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
   EXPECT_LT(scores[1].bad_relative.at(0.05), 0.3) << to_table(scores);
-  EXPECT_LT(scores[1].bad_pixels.at(1), 0.2) << to_table(scores);
+  EXPECT_LT(scores[1].bad_pixels.at(1), 0.1) << to_table(scores);
   EXPECT_GT(scores[1].completeness, 0.9) << to_table(scores);
 
   const Outcome missing = run(file("left.png") + " " + file("none.png") + " -c " +
