@@ -18,8 +18,9 @@ namespace {
 struct EvaluateArguments {
   std::string prediction, normals, confidence;
   std::string set;
-  std::string truth, valid, occlusion, truth_normals, calibration;
+  std::string truth, valid, occlusion, truth_normals, image, field_of_view, calibration;
   int view = 0, source = 1;
+  double far_distance = 0;  ///< metres, 0: do not score what has no ground truth
   std::string error_map;
   bool as_json = false;
 };
@@ -30,8 +31,15 @@ cv::Mat read_mask(const fs::path& path) {
   return image;
 }
 
+/// 8-bit grey levels of any image.
+cv::Mat read_grey(const fs::path& path) {
+  cv::Mat grey;
+  ws::to_intensity(ws::read_image(path), path.string()).convertTo(grey, CV_8U, 255);
+  return grey;
+}
+
 /// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),
-/// normalN.tiff and calib.yaml.
+/// normalN.tiff, camN.png, fovN.png and calib.yaml.
 void take_from_set(EvaluateArguments& a) {
   const fs::path folder = a.set;
   if (!fs::is_directory(folder))
@@ -45,6 +53,8 @@ void take_from_set(EvaluateArguments& a) {
   take(a.occlusion, "occ" + n + "_" + std::to_string(a.source) + ".png");
   take(a.occlusion, "occ" + n + ".png");
   take(a.truth_normals, "normal" + n + ".tiff");
+  take(a.image, "cam" + n + ".png");
+  take(a.field_of_view, "fov" + n + ".png");
   take(a.calibration, "calib.yaml");
 }
 
@@ -58,6 +68,13 @@ void run_evaluate(EvaluateArguments a) {
   if (!a.valid.empty()) truth.valid = read_mask(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_mask(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = ws::read_map(a.truth_normals);
+  if (!a.image.empty()) truth.image = read_grey(a.image);
+  if (a.far_distance > 0) {
+    if (a.field_of_view.empty()) {
+      throw ws::Error("--far-distance needs --field-of-view, or a folder with it by --set.");
+    }
+    truth.field_of_view = read_mask(a.field_of_view);
+  }
   const cv::Mat prediction = ws::read_map(a.prediction);
   const cv::Mat normals = a.normals.empty() ? cv::Mat() : ws::read_map(a.normals);
   const ws::Rig rig = ws::read_calibration(a.calibration, prediction.size()).rig;
@@ -68,6 +85,10 @@ void run_evaluate(EvaluateArguments a) {
   }
   const std::vector<ws::RegionScores> scores =
       ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
+  ws::FarScores far;
+  if (a.far_distance > 0) {
+    far = ws::far_scores(prediction, truth, rig.views[a.view], rig.views[a.source], a.far_distance);
+  }
   std::vector<ws::SparsificationPoint> curve;
   std::vector<ws::ReliabilityBin> bins;
   if (!a.confidence.empty()) {
@@ -78,10 +99,12 @@ void run_evaluate(EvaluateArguments a) {
   }
   if (a.as_json) {
     std::cout << "{\"regions\": " << ws::to_json(scores)
+              << ", \"far\": " << (a.far_distance > 0 ? ws::to_json(far) : "null")
               << ", \"sparsification\": " << ws::to_json(curve)
               << ", \"reliability\": " << ws::to_json(bins) << "}\n";
   } else {
-    std::cout << ws::to_table(scores) << ws::to_table(curve) << ws::to_table(bins);
+    std::cout << ws::to_table(scores) << ws::to_table(far) << ws::to_table(curve)
+              << ws::to_table(bins);
   }
   if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
 }
@@ -98,12 +121,23 @@ void add_evaluate_command(CLI::App& app) {
       "--confidence", a->confidence,
       "Confidence map: prints the error of the most confident pixels, and how often pixels "
       "of each confidence are right");
-  command->add_option("--set", a->set, "Folder with depthN.tiff, validN.png, occN.png, calib.yaml");
+  command->add_option("--set", a->set,
+                      "Folder with depthN.tiff, validN.png, occN.png, normalN.tiff, camN.png, "
+                      "fovN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");
   command->add_option("--occlusion", a->occlusion,
                       "255 visible in the source, 0 occluded, 128 outside");
   command->add_option("--truth-normals", a->truth_normals, "Ground truth of the normals");
+  command->add_option("--image", a->image,
+                      "The view's image: scores textured surfaces, and their interiors, as well");
+  command
+      ->add_option("--far-distance", a->far_distance,
+                   "Also prints how much of what has no ground truth, such as a sky, comes out "
+                   "at this distance (metres) to within 2 px")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--field-of-view", a->field_of_view,
+                      "Mask, 0 = outside the lens; for --far-distance");
   command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
   command->add_option("--view", a->view, "Camera of the distance map")->capture_default_str();
   command->add_option("--source", a->source, "Camera in which displacements are measured")

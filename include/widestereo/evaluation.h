@@ -16,12 +16,31 @@ struct GroundTruth {
   cv::Mat valid;     ///< empty, or CV_8UC1, 0 = do not score
   cv::Mat
       occlusion;  ///< empty, or CV_8UC1: 255 visible in the source view, 0 occluded, 128 outside it
-  cv::Mat normals;  ///< empty, or CV_32FC3, unit, reference frame
+  cv::Mat normals;        ///< empty, or CV_32FC3, unit, reference frame
+  cv::Mat image;          ///< empty, or CV_8UC1, grey levels: scores the textured regions too
+  cv::Mat field_of_view;  ///< empty, or CV_8UC1, 0 = outside the lens's field of view: far_scores()
 };
+
+/// Textured: the grey levels of the square patch of this side around the pixel have at least this
+/// standard deviation (of the population). Patches are cut at the image border and at the camera's
+/// field of view, whose edge is no texture.
+constexpr int texture_patch_side = 9;          ///< pixels
+constexpr double texture_least_deviation = 4;  ///< grey levels
+
+/// An edge of the true scene runs between horizontal or vertical neighbours, both inside the
+/// camera's field of view, if the larger of their true distances exceeds the smaller by more than
+/// this share of it, if their true normals differ by more than this angle, or if only one has a
+/// true distance. Both are edge pixels, whatever GroundTruth::valid says. Interior: at least this
+/// far from the nearest edge pixel (Euclidean, centre to centre).
+constexpr double edge_distance_step = 0.05;
+constexpr double edge_normal_step = 20;        ///< degrees
+constexpr double interior_edge_clearance = 8;  ///< pixels
 
 /// Scores over one set of pixels. Shares lie in [0, 1]. A pixel without prediction counts as bad.
 struct RegionScores {
-  std::string region;       ///< "all", "non-occluded", "0-30", "30-60", "60-90", ">90" degrees
+  /// "all", "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg", and where there is an
+  /// image "textured" and "textured interior" (textured, and not at an edge of the true scene).
+  std::string region;
   long pixels = 0;          ///< pixels scored
   double completeness = 0;  ///< share with a prediction
   std::map<double, double>
@@ -43,7 +62,8 @@ struct RegionScores {
 /// Scores `distance` (CV_32FC1, metres along the ray; <= 0 or non-finite = no prediction) of view
 /// `reference` against ground truth. Displacements are those of the predicted point's projection in
 /// view `source` from the true one's; a point that does not project there counts as bad. `normals`
-/// (may be empty) as in GroundTruth. Field-angle bands are taken over the non-occluded pixels.
+/// (may be empty) as in GroundTruth. Field-angle bands and the textured regions are taken over the
+/// non-occluded pixels.
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source);
@@ -51,6 +71,22 @@ std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& norma
 /// The scores as a fixed-width table and as JSON text.
 std::string to_table(const std::vector<RegionScores>& scores);
 std::string to_json(const std::vector<RegionScores>& scores);
+
+/// How far things without ground truth come out, such as a sky.
+struct FarScores {
+  double distance = 0;  ///< metres along the ray, taken as true
+  long pixels = 0;      ///< inside the field of view, without a true distance, and the point at
+                        ///< `distance` projects into the source image
+  double right = 0;     ///< share of them whose predicted point lies within 2 px of that point
+};
+
+/// `truth` needs a field of view; GroundTruth::valid has no part in it.
+FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const View& reference,
+                     const View& source, double far_distance);
+
+/// The scores as one line (empty for no pixels) and as JSON text.
+std::string to_table(const FarScores& scores);
+std::string to_json(const FarScores& scores);
 
 /// Quality without ground truth, as in Table 1 of Hu et al.: shares over the pixels with a plane.
 struct ConsistencyScores {

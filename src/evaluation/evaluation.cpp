@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "widestereo/error.h"
 
@@ -17,6 +18,7 @@ namespace {
 constexpr std::array<double, 4> relative_thresholds = {0.005, 0.01, 0.02, 0.05};
 constexpr std::array<double, 3> pixel_thresholds = {0.5, 1, 2};
 constexpr uchar visible = 255;
+constexpr double right_pixels = 2;
 constexpr double not_projected = std::numeric_limits<double>::quiet_NaN();
 
 /// One scored pixel.
@@ -30,6 +32,8 @@ struct Sample {
   double displacement = not_projected;  ///< pixels in the source
   double normal_angle = -1;             ///< degrees
   double confidence = 0;
+  bool textured = false;
+  bool interior = false;
 };
 
 bool has_distance(float distance) { return distance > 0 && std::isfinite(distance); }
@@ -49,9 +53,7 @@ double angle_between(const cv::Vec3f& a, const cv::Vec3f& b) {
   return std::atan2(u.cross(v).norm(), u.dot(v)) * 180 / std::numbers::pi;
 }
 
-std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
-                            const cv::Mat& confidence, const GroundTruth& truth,
-                            const View& reference, const View& source) {
+void require_maps(const cv::Mat& distance, const GroundTruth& truth, const View& reference) {
   const cv::Size size = distance.size();
   if (distance.type() != CV_32FC1 || truth.distance.empty() || distance.empty()) {
     throw Error("Distance maps to compare must have one 32-bit float channel and not be empty.");
@@ -60,21 +62,118 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   require_size(truth.valid, size, CV_8UC1, "mask of valid pixels");
   require_size(truth.occlusion, size, CV_8UC1, "occlusion map");
   require_size(truth.normals, size, CV_32FC3, "ground truth of normals");
-  require_size(normals, size, CV_32FC3, "normal map");
-  require_size(confidence, size, CV_32FC1, "confidence map");
+  require_size(truth.image, size, CV_8UC1, "reference image");
+  require_size(truth.field_of_view, size, CV_8UC1, "mask of the field of view");
   if (reference.camera.width != size.width || reference.camera.height != size.height) {
     throw Error("The distance map is " + std::to_string(size.width) + "x" +
                 std::to_string(size.height) + ", but the calibration of " + reference.name +
                 " is " + std::to_string(reference.camera.width) + "x" +
                 std::to_string(reference.camera.height) + "; give the view's own map.");
   }
-  const cv::Mat rays = ray_image(reference.camera, {});
-  const Eigen::Isometry3d motion = source_from_reference(source, reference);
-  const auto to_source = [&](const Eigen::Vector3d& point, Eigen::Vector2d& pixel) {
-    return project(source.camera, motion * point, pixel) && pixel.x() >= -0.5 &&
-           pixel.y() >= -0.5 && pixel.x() < source.camera.width - 0.5 &&
-           pixel.y() < source.camera.height - 0.5;
+}
+
+Eigen::Vector3d direction(const cv::Vec4f& ray) {
+  return Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>();
+}
+
+/// Projects points of the reference view into the source view.
+class SourceView {
+ public:
+  SourceView(const View& source, const View& reference)
+      : camera_(source.camera), motion_(source_from_reference(source, reference)) {}
+
+  bool in_image(const Eigen::Vector3d& point, Eigen::Vector2d& pixel) const {
+    return project(camera_, motion_ * point, pixel) && pixel.x() >= -0.5 && pixel.y() >= -0.5 &&
+           pixel.x() < camera_.width - 0.5 && pixel.y() < camera_.height - 0.5;
+  }
+  /// How far the point's projection lies from `expected`; not_projected where it has none.
+  double displacement(const Eigen::Vector3d& point, const Eigen::Vector2d& expected) const {
+    Eigen::Vector2d pixel;
+    return project(camera_, motion_ * point, pixel) ? (pixel - expected).norm() : not_projected;
+  }
+
+ private:
+  const Camera& camera_;
+  Eigen::Isometry3d motion_;
+};
+
+cv::Mat inside_field_of_view(const cv::Mat& rays) {
+  cv::Mat valid;
+  cv::extractChannel(rays, valid, 3);
+  return valid > 0;
+}
+
+/// 255 where the patch around the pixel has texture.
+cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& rays) {
+  cv::Mat value;
+  image.convertTo(value, CV_64F);
+  cv::Mat weight;
+  inside_field_of_view(rays).convertTo(weight, CV_64F, 1 / 255.0);
+  value = value.mul(weight);
+  const auto patch_sum = [](const cv::Mat& map) {
+    cv::Mat sum;
+    cv::boxFilter(map, sum, CV_64F, {texture_patch_side, texture_patch_side}, {-1, -1}, false,
+                  cv::BORDER_CONSTANT);
+    return sum;
   };
+  const cv::Mat count = patch_sum(weight);
+  const cv::Mat sum = patch_sum(value);
+  // Whole numbers, so the comparison is exact.
+  const cv::Mat variance = count.mul(patch_sum(value.mul(value))) - sum.mul(sum);
+  const cv::Mat least = texture_least_deviation * texture_least_deviation * count.mul(count);
+  return (variance >= least) & (count > 0);
+}
+
+bool is_edge(const GroundTruth& truth, cv::Point a, cv::Point b) {
+  const float first = truth.distance.at<float>(a);
+  const float second = truth.distance.at<float>(b);
+  if (has_distance(first) != has_distance(second)) return true;
+  if (!has_distance(first)) return false;
+  const auto nearer = static_cast<double>(std::min(first, second));
+  const auto farther = static_cast<double>(std::max(first, second));
+  if (farther - nearer > edge_distance_step * nearer) return true;
+  return !truth.normals.empty() && angle_between(truth.normals.at<cv::Vec3f>(a),
+                                                 truth.normals.at<cv::Vec3f>(b)) > edge_normal_step;
+}
+
+/// 255 where the pixel is far enough from every edge of the true scene.
+cv::Mat interior_pixels(const GroundTruth& truth, const cv::Mat& rays) {
+  const cv::Mat inside = inside_field_of_view(rays);
+  cv::Mat no_edge(inside.size(), CV_8UC1, cv::Scalar(255));
+  for (int y = 0; y < inside.rows; ++y) {
+    for (int x = 0; x < inside.cols; ++x) {
+      const cv::Point pixel(x, y);
+      for (const cv::Point neighbour : {cv::Point(x + 1, y), cv::Point(x, y + 1)}) {
+        if (neighbour.x >= inside.cols || neighbour.y >= inside.rows ||
+            inside.at<uchar>(pixel) == 0 || inside.at<uchar>(neighbour) == 0 ||
+            !is_edge(truth, pixel, neighbour)) {
+          continue;
+        }
+        no_edge.at<uchar>(pixel) = no_edge.at<uchar>(neighbour) = 0;
+      }
+    }
+  }
+  if (cv::countNonZero(no_edge == 0) == 0) return no_edge;
+  cv::Mat clearance;
+  cv::distanceTransform(no_edge, clearance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  return clearance >= interior_edge_clearance;
+}
+
+std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
+                            const cv::Mat& confidence, const GroundTruth& truth,
+                            const View& reference, const View& source) {
+  const cv::Size size = distance.size();
+  require_maps(distance, truth, reference);
+  require_size(normals, size, CV_32FC3, "normal map");
+  require_size(confidence, size, CV_32FC1, "confidence map");
+  const cv::Mat rays = ray_image(reference.camera, {});
+  const SourceView source_view(source, reference);
+  cv::Mat textured;
+  cv::Mat interior;
+  if (!truth.image.empty()) {
+    textured = textured_pixels(truth.image, rays);
+    interior = interior_pixels(truth, rays);
+  }
   std::vector<Sample> samples;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -82,21 +181,22 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       if (!has_distance(gt) || (!truth.valid.empty() && truth.valid.at<uchar>(y, x) == 0)) continue;
       Sample& sample = samples.emplace_back();
       sample.truth = static_cast<double>(gt);
-      const cv::Vec4f& r = rays.at<cv::Vec4f>(y, x);
-      const Eigen::Vector3d ray = Eigen::Vector3f(r[0], r[1], r[2]).cast<double>();
+      const Eigen::Vector3d ray = direction(rays.at<cv::Vec4f>(y, x));
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * 180 / std::numbers::pi;
       sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
       if (!confidence.empty()) sample.confidence = static_cast<double>(confidence.at<float>(y, x));
+      if (!truth.image.empty()) {
+        sample.textured = textured.at<uchar>(y, x) != 0;
+        sample.interior = interior.at<uchar>(y, x) != 0;
+      }
       const float d = distance.at<float>(y, x);
       sample.predicted = has_distance(d);
       if (!sample.predicted) continue;
       sample.error = std::abs(static_cast<double>(d) - sample.truth);
-      Eigen::Vector2d predicted;
       Eigen::Vector2d expected;
-      sample.in_source = to_source(sample.truth * ray, expected);
-      if (sample.in_source &&
-          project(source.camera, motion * (static_cast<double>(d) * ray), predicted)) {
-        sample.displacement = (predicted - expected).norm();
+      sample.in_source = source_view.in_image(sample.truth * ray, expected);
+      if (sample.in_source) {
+        sample.displacement = source_view.displacement(static_cast<double>(d) * ray, expected);
       }
       if (!normals.empty() && !truth.normals.empty()) {
         sample.normal_angle =
@@ -107,8 +207,9 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   return samples;
 }
 
-/// Within 2 px of its true place in the source; false where the predicted point does not project.
-bool is_right(const Sample& sample) { return sample.displacement <= 2; }
+/// Within right_pixels of its true place in the source; false where the predicted point does not
+/// project.
+bool is_right(const Sample& sample) { return sample.displacement <= right_pixels; }
 
 double median_of(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -193,12 +294,53 @@ std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& norma
       return s.non_occluded && s.theta >= from && s.theta < to;
     });
   };
-  return {score_where("all", [](const Sample&) { return true; }),
-          score_where("non-occluded", [](const Sample& s) { return s.non_occluded; }),
-          band("0-30 deg", 0, 30),
-          band("30-60 deg", 30, 60),
-          band("60-90 deg", 60, 90),
-          band(">90 deg", 90, 181)};
+  std::vector<RegionScores> scores = {
+      score_where("all", [](const Sample&) { return true; }),
+      score_where("non-occluded", [](const Sample& s) { return s.non_occluded; }),
+      band("0-30 deg", 0, 30),
+      band("30-60 deg", 30, 60),
+      band("60-90 deg", 60, 90),
+      band(">90 deg", 90, 181)};
+  if (!truth.image.empty()) {
+    scores.push_back(
+        score_where("textured", [](const Sample& s) { return s.non_occluded && s.textured; }));
+    scores.push_back(score_where("textured interior", [](const Sample& s) {
+      return s.non_occluded && s.textured && s.interior;
+    }));
+  }
+  return scores;
+}
+
+FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const View& reference,
+                     const View& source, double far_distance) {
+  require_maps(distance, truth, reference);
+  if (truth.field_of_view.empty()) {
+    throw Error(
+        "Far things without ground truth are told from the lens's border by a mask of the "
+        "field of view; give one.");
+  }
+  const cv::Mat rays = ray_image(reference.camera, {});
+  const SourceView source_view(source, reference);
+  FarScores scores;
+  scores.distance = far_distance;
+  long right = 0;
+  for (int y = 0; y < distance.rows; ++y) {
+    for (int x = 0; x < distance.cols; ++x) {
+      const cv::Vec4f& r = rays.at<cv::Vec4f>(y, x);
+      if (truth.field_of_view.at<uchar>(y, x) == 0 || r[3] == 0 ||
+          has_distance(truth.distance.at<float>(y, x))) {
+        continue;
+      }
+      Eigen::Vector2d expected;
+      if (!source_view.in_image(far_distance * direction(r), expected)) continue;
+      ++scores.pixels;
+      const float d = distance.at<float>(y, x);
+      right += has_distance(d) && source_view.displacement(static_cast<double>(d) * direction(r),
+                                                           expected) <= right_pixels;
+    }
+  }
+  scores.right = static_cast<double>(right) / static_cast<double>(std::max(scores.pixels, 1L));
+  return scores;
 }
 
 ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost) {

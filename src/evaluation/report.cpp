@@ -27,12 +27,12 @@ nlohmann::ordered_json shares(const std::map<double, double>& bad) {
 
 std::string to_table(const std::vector<RegionScores>& scores) {
   std::string table =
-      formatted("%-13s %8s %6s | %26s | %19s | %7s %7s %7s %7s | %s\n", "region", "pixels", "compl",
+      formatted("%-17s %8s %6s | %26s | %19s | %7s %7s %7s %7s | %s\n", "region", "pixels", "compl",
                 "bad 0.5   1   2   5 % of d", "bad 0.5   1   2 px", "med px", "med %", "MAE m",
                 "RMSE m", "normals med, mean deg");
   for (const RegionScores& s : scores) {
     if (s.pixels == 0) continue;
-    table += formatted("%-13s %8ld %5.1f%% |", s.region.c_str(), s.pixels, 100 * s.completeness);
+    table += formatted("%-17s %8ld %5.1f%% |", s.region.c_str(), s.pixels, 100 * s.completeness);
     for (const auto& [threshold, share] : s.bad_relative)
       table += formatted(" %5.1f%%", 100 * share);
     table += " |";
@@ -65,6 +65,18 @@ std::string to_json(const std::vector<RegionScores>& scores) {
                     {"mean_normal_angle", s.mean_normal_angle},
                     {"median_normal_angle", s.median_normal_angle}});
   }
+  return json.dump(2);
+}
+
+std::string to_table(const FarScores& scores) {
+  if (scores.pixels == 0) return "";
+  return formatted("without ground truth: %ld pixels, %.1f%% within 2 px of %g m\n", scores.pixels,
+                   100 * scores.right, scores.distance);
+}
+
+std::string to_json(const FarScores& scores) {
+  const nlohmann::ordered_json json = {
+      {"distance", scores.distance}, {"pixels", scores.pixels}, {"right", scores.right}};
   return json.dump(2);
 }
 

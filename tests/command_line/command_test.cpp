@@ -143,6 +143,23 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   expect_error(
       "evaluate " + file("prediction.tiff") + common + " --confidence " + file("none.tiff"),
       "none.tiff");
+  // The right half has no ground truth.
+  truth.colRange(48, 96).setTo(0);
+  cv::imwrite(file("half_truth.tiff"), truth);
+  cv::imwrite(file("fov.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  const std::string far = "evaluate " + file("prediction.tiff") + " -c " + file("calib.yaml") +
+                          " --truth " + file("half_truth.tiff") + " --image " + file("left.png") +
+                          " --far-distance ";
+  const Outcome near_by = run(far + "2 --json --field-of-view " + file("fov.png"));
+  ASSERT_EQ(near_by.exit_code, 0) << near_by.output;
+  const nlohmann::json both = nlohmann::json::parse(near_by.output);
+  EXPECT_EQ(both["far"]["right"], 1.0);
+  EXPECT_GT(both["far"]["pixels"], 1000);
+  EXPECT_EQ(both["regions"][6]["region"], "textured");
+  EXPECT_GT(both["regions"][6]["pixels"], 1000) << "noise is texture";
+  EXPECT_NE(run(far + "50 --field-of-view " + file("fov.png")).output.find("of 50 m"),
+            std::string::npos);
+  expect_error(far + "50", "--field-of-view");
   expect_error("evaluate " + file("no.tiff") + common, "no.tiff");
   expect_error("evaluate " + file("left.png") + common, "left.png");
   expect_error("evaluate " + file("prediction.tiff"), "--truth");

@@ -80,6 +80,113 @@ TEST_F(FourPixels, OcclusionAndNormalsCount) {
   EXPECT_EQ(scores[1].bad_relative.at(0.005), 0);
 }
 
+TEST_F(FourPixels, FarThingsWithoutGroundTruthAreRightWithinTwoPixels) {
+  truth_.distance.row(0).setTo(0);  // the other row has ground truth
+  truth_.field_of_view = cv::Mat(2, 4, CV_8UC1, cv::Scalar(255));
+  // At 100 m the last pixel's point lies right of the source image, at u = 300.3.
+  source_.camera.width = 300;
+  source_.camera.cx = 299.8;
+  cv::Mat distance(2, 4, CV_32FC1, cv::Scalar(100));
+  distance.at<float>(0, 1) = 40;  // 100 / 40 - 100 / 100 = 1.5 px
+  distance.at<float>(0, 2) = 20;  // 4 px
+  FarScores far = far_scores(distance, truth_, reference_, source_, 100);
+  EXPECT_EQ(far.pixels, 3);
+  EXPECT_NEAR(far.right, 2 / 3.0, 1e-12);
+  EXPECT_NE(to_table(far).find("3 pixels, 66.7% within 2 px of 100 m"), std::string::npos);
+  EXPECT_EQ(nlohmann::json::parse(to_json(far))["pixels"], 3);
+  distance.at<float>(0, 0) = 0;  // no prediction is not right
+  EXPECT_NEAR(far_scores(distance, truth_, reference_, source_, 100).right, 1 / 3.0, 1e-12);
+  truth_.field_of_view.at<uchar>(0, 0) = 0;
+  far = far_scores(distance, truth_, reference_, source_, 100);
+  EXPECT_EQ(far.pixels, 2);
+  EXPECT_NEAR(far.right, 0.5, 1e-12);
+  truth_.field_of_view.release();
+  EXPECT_THROW(far_scores(distance, truth_, reference_, source_, 100), Error);
+}
+
+/// 40 x 24 pixels, stripes in the right half, a step of distance at column 30, a crease at row 20.
+class TexturedScene : public ::testing::Test {
+ protected:
+  static constexpr int columns = 40;
+  static constexpr int rows = 24;
+
+  TexturedScene() {
+    for (View* view : {&reference_, &source_}) {
+      view->camera.width = columns;
+      view->camera.height = rows;
+      view->camera.fx = view->camera.fy = 100;
+      view->camera.cx = 19.5;
+      view->camera.cy = 11.5;
+    }
+    source_.world_from_camera.translation() = Eigen::Vector3d(0.01, 0, 0);
+    truth_.distance = cv::Mat(rows, columns, CV_32FC1, cv::Scalar(2));
+    truth_.distance.colRange(30, columns).setTo(3);
+    truth_.normals = cv::Mat(rows, columns, CV_32FC3, cv::Scalar(0, 0, -1));
+    truth_.normals.rowRange(20, rows).setTo(tilted(30));
+    // One stripe of nine columns deviates by 3.8 grey levels, two by 5.0: textured from column 19.
+    truth_.image = cv::Mat::zeros(rows, columns, CV_8UC1);
+    for (int x = 21; x < columns; x += 2) truth_.image.col(x).setTo(12);
+  }
+  static cv::Scalar tilted(double degrees) {
+    return {std::sin(degrees * M_PI / 180), 0, -std::cos(degrees * M_PI / 180)};
+  }
+  const RegionScores& textured(const cv::Mat& normals) {
+    scores_ = evaluate(truth_.distance, normals, truth_, reference_, source_);
+    return scores_.at(6);
+  }
+  const RegionScores& interior() const { return scores_.at(7); }
+
+  View reference_, source_;
+  GroundTruth truth_;
+  std::vector<RegionScores> scores_;
+};
+
+TEST_F(TexturedScene, TexturedAndInteriorPixelsAreAsCountedByHand) {
+  cv::Mat normals = truth_.normals.clone();
+  normals.col(20).rowRange(0, 20).setTo(tilted(40));
+  EXPECT_EQ(textured(normals).pixels, 21 * 24);
+  EXPECT_EQ(scores_[6].region, "textured");
+  EXPECT_NEAR(scores_[6].mean_normal_angle, 20 * 40 / 504.0, 1e-3);
+  // Eight pixels from columns 29 and 30: 19 to 21, 38 and 39; eight from rows 19 and 20: up to 11.
+  EXPECT_EQ(interior().region, "textured interior");
+  EXPECT_EQ(interior().pixels, 5 * 12);
+  EXPECT_NEAR(interior().mean_normal_angle, 12 * 40 / 60.0, 1e-3);
+  EXPECT_NE(to_table(scores_).find("textured interior       60 "), std::string::npos);
+}
+
+TEST_F(TexturedScene, OcclusionAndMissingGroundTruthCount) {
+  truth_.occlusion = cv::Mat(rows, columns, CV_8UC1, cv::Scalar(255));
+  truth_.occlusion.at<uchar>(0, 19) = 0;
+  // A hole in the corner is an edge, too: of columns 38 and 39 rows 9 to 11 remain.
+  truth_.distance.at<float>(0, 39) = 0;
+  EXPECT_EQ(textured({}).pixels, 504 - 2);
+  EXPECT_EQ(interior().pixels, 3 * 12 - 1 + 2 * 3);
+}
+
+TEST_F(TexturedScene, SmallStepsAreNoEdges) {
+  truth_.distance.colRange(30, columns).setTo(2.09);
+  truth_.normals.rowRange(20, rows).setTo(tilted(19));
+  EXPECT_EQ(textured({}).pixels, 504);
+  EXPECT_EQ(interior().pixels, 504);
+  truth_.distance.colRange(30, columns).setTo(2.11);
+  truth_.normals.rowRange(20, rows).setTo(tilted(21));
+  textured({});
+  EXPECT_EQ(interior().pixels, 60);
+}
+
+TEST_F(TexturedScene, TheBorderOfTheFieldOfViewIsNoTexture) {
+  reference_.camera.max_theta = std::atan(0.1);  // 10 pixels
+  truth_.image.setTo(0);
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      if (std::hypot(x - 19.5, y - 11.5) <= 10) truth_.image.at<uchar>(y, x) = 100;
+    }
+  }
+  EXPECT_EQ(textured({}).pixels, 0);
+  reference_.camera.max_theta = M_PI;
+  EXPECT_GT(textured({}).pixels, 0);
+}
+
 TEST_F(FourPixels, EmptyAndWrongInputs) {
   truth_.valid.setTo(0);
   const std::vector<RegionScores> none = evaluate(truth_.distance, {}, truth_, reference_, source_);
