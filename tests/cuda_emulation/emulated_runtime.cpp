@@ -16,8 +16,8 @@ using widestereo::test::emulation;
 using Work = std::function<void()>;
 using Clock = std::chrono::steady_clock;
 
-thread_local dim3 blockIdx;
-thread_local dim3 threadIdx;
+__thread dim3 blockIdx;
+__thread dim3 threadIdx;
 
 struct CUgraph_st {
   std::vector<Work> nodes;

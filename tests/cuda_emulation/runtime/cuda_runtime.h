@@ -11,8 +11,9 @@
 #define __grid_constant__
 #define __launch_bounds__(threads, blocks)
 
-extern thread_local dim3 blockIdx;
-extern thread_local dim3 threadIdx;
+// Not thread_local, whose wrapper for initialisation g++'s sanitizer takes for a null pointer.
+extern __thread dim3 blockIdx;
+extern __thread dim3 threadIdx;
 
 inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
 
