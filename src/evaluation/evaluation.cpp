@@ -32,8 +32,7 @@ struct Sample {
   double displacement = not_projected;  ///< pixels in the source
   double normal_angle = -1;             ///< degrees
   double confidence = 0;
-  bool textured = false;
-  bool interior = false;
+  cv::Point pixel;
 };
 
 bool has_distance(float distance) { return distance > 0 && std::isfinite(distance); }
@@ -168,27 +167,18 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   require_size(confidence, size, CV_32FC1, "confidence map");
   const cv::Mat rays = ray_image(reference.camera, {});
   const SourceView source_view(source, reference);
-  cv::Mat textured;
-  cv::Mat interior;
-  if (!truth.image.empty()) {
-    textured = textured_pixels(truth.image, rays);
-    interior = interior_pixels(truth, rays);
-  }
   std::vector<Sample> samples;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float gt = truth.distance.at<float>(y, x);
       if (!has_distance(gt) || (!truth.valid.empty() && truth.valid.at<uchar>(y, x) == 0)) continue;
       Sample& sample = samples.emplace_back();
+      sample.pixel = {x, y};
       sample.truth = static_cast<double>(gt);
       const Eigen::Vector3d ray = direction(rays.at<cv::Vec4f>(y, x));
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * 180 / std::numbers::pi;
       sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
       if (!confidence.empty()) sample.confidence = static_cast<double>(confidence.at<float>(y, x));
-      if (!truth.image.empty()) {
-        sample.textured = textured.at<uchar>(y, x) != 0;
-        sample.interior = interior.at<uchar>(y, x) != 0;
-      }
       const float d = distance.at<float>(y, x);
       sample.predicted = has_distance(d);
       if (!sample.predicted) continue;
@@ -302,11 +292,16 @@ std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& norma
       band("60-90 deg", 60, 90),
       band(">90 deg", 90, 181)};
   if (!truth.image.empty()) {
-    scores.push_back(
-        score_where("textured", [](const Sample& s) { return s.non_occluded && s.textured; }));
-    scores.push_back(score_where("textured interior", [](const Sample& s) {
-      return s.non_occluded && s.textured && s.interior;
-    }));
+    const cv::Mat rays = ray_image(reference.camera, {});
+    const cv::Mat textured = textured_pixels(truth.image, rays);
+    const cv::Mat interior = textured & interior_pixels(truth, rays);
+    const auto within = [&](const std::string& region, const cv::Mat& mask) {
+      return score_where(region, [&mask](const Sample& s) {
+        return s.non_occluded && mask.at<uchar>(s.pixel) != 0;
+      });
+    };
+    scores.push_back(within("textured", textured));
+    scores.push_back(within("textured interior", interior));
   }
   return scores;
 }
