@@ -38,7 +38,7 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS;
-                    // filling: reasons not to fill
+                    // adopting: ADOPT_UNSEEN; filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
                       // regression: standard deviation (px) that is enough; 0: normals only
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
