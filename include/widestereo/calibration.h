@@ -12,7 +12,7 @@ namespace widestereo {
 enum class CalibrationFormat { kalibr, basalt, opencv };
 
 struct Calibration {
-  Rig rig;  ///< view 0's camera frame is the world frame
+  Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu or T_imu_cam
   CalibrationFormat format = CalibrationFormat::kalibr;
 };
 
@@ -22,12 +22,13 @@ struct Calibration {
 /// Throws Error naming the file, the key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
-/// Writes a Kalibr camchain (with the extra key max_theta_deg where the field of view is limited).
-/// Throws Error when a camera has no Kalibr form (skew, k3) or the file cannot be written.
+/// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg
+/// where the field of view is limited). Throws Error when a camera has no Kalibr form (skew, k3) or
+/// the file cannot be written.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
-/// Writes a Basalt JSON. Throws Error when a camera has no Basalt form or the file cannot be
-/// written.
+/// Writes a Basalt JSON; T_imu_cam of view 0 is the identity where no IMU is known. Throws Error
+/// when a camera has no Basalt form or the file cannot be written.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace widestereo

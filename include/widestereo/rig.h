@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct View {
 /// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a file).
 struct Rig {
   std::vector<View> views;
+  /// X = T X_imu in the common frame, metres; none where no IMU was calibrated.
+  std::optional<Eigen::Isometry3d> world_from_imu = std::nullopt;
 };
 
 /// Pose of view `source` relative to view `reference`: X_source = T X_reference.
@@ -33,8 +36,8 @@ inline double baseline(const View& a, const View& b) {
   return (a.world_from_camera.translation() - b.world_from_camera.translation()).norm();
 }
 
-/// Throws Error unless every camera is valid, every pose is rigid and finite, masks fit and no two
-/// views share a centre. `name` (a file, say) begins the message.
+/// Throws Error unless every camera is valid, every pose (the IMU's, too) is rigid and finite,
+/// masks fit and no two views share a centre. `name` (a file, say) begins the message.
 void validate(const Rig& rig, const std::string& name);
 
 }  // namespace widestereo

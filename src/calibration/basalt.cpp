@@ -169,8 +169,12 @@ Rig read_basalt(const Document& document) {
         view.camera.max_theta = limits[i].get<double>() * std::numbers::pi / 180;
       }
     }
-    const Eigen::Isometry3d first_from_rig = rig.views.front().world_from_camera.inverse();
-    for (View& view : rig.views) view.world_from_camera = first_from_rig * view.world_from_camera;
+    const Eigen::Isometry3d first_from_imu = rig.views.front().world_from_camera.inverse();
+    for (View& view : rig.views) view.world_from_camera = first_from_imu * view.world_from_camera;
+    // basalt_calibrate leaves the identity where no IMU was calibrated, as write_basalt() does.
+    if (!first_from_imu.isApprox(Eigen::Isometry3d::Identity(), 1e-9)) {
+      rig.world_from_imu = first_from_imu;
+    }
     return rig;
   } catch (const Json::exception& error) {
     document.fail(std::string("It is not valid JSON of a Basalt calibration (") + error.what() +
@@ -188,9 +192,12 @@ void write_basalt(const std::filesystem::path& path, const Rig& rig) {
   value["resolution"] = Json::array();
   Json limits = Json::array();
   bool limited = false;
+  const Eigen::Isometry3d imu_from_world =
+      (rig.world_from_imu ? *rig.world_from_imu : rig.views.front().world_from_camera).inverse();
   for (const View& view : rig.views) {
-    const Eigen::Quaterniond q(view.world_from_camera.linear());
-    const Eigen::Vector3d p = view.world_from_camera.translation();
+    const Eigen::Isometry3d imu_from_camera = imu_from_world * view.world_from_camera;
+    const Eigen::Quaterniond q(imu_from_camera.linear());
+    const Eigen::Vector3d p = imu_from_camera.translation();
     value["T_imu_cam"].push_back({{"px", p.x()},
                                   {"py", p.y()},
                                   {"pz", p.z()},

@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "calibration/formats.h"
 #include "widestereo/error.h"
@@ -155,6 +156,13 @@ View read_view(const Document& document, const std::string& name, const YAML::No
   return view;
 }
 
+/// Where the IMU is, by Kalibr's key or by OpenVINS's; none where the camera has neither.
+std::optional<Eigen::Isometry3d> camera_from_imu(const Block& block) {
+  if (block.has("T_cam_imu")) return block.motion("T_cam_imu");
+  if (block.has("T_imu_cam")) return block.motion("T_imu_cam").inverse();
+  return std::nullopt;
+}
+
 /// yaml-cpp refuses OpenCV's header line, which OpenVINS files begin with.
 std::string without_directive(std::string text) {
   const std::size_t at = text.find("%YAML:1.0");
@@ -174,11 +182,15 @@ Rig read_kalibr(const Document& document) {
       const std::string name = "cam" + std::to_string(i);
       if (!root[name]) break;
       View view = read_view(document, name, root[name]);
-      if (i > 0) {
-        const Eigen::Isometry3d from_previous =
-            Block(document, name, root[name]).motion("T_cn_cnm1");
-        view.world_from_camera = rig.views.back().world_from_camera * from_previous.inverse();
+      const Block block(document, name, root[name]);
+      const std::optional<Eigen::Isometry3d> from_imu = camera_from_imu(block);
+      if (i > 0 && from_imu && rig.world_from_imu && !block.has("T_cn_cnm1")) {
+        view.world_from_camera = *rig.world_from_imu * from_imu->inverse();
+      } else if (i > 0) {
+        view.world_from_camera =
+            rig.views.back().world_from_camera * block.motion("T_cn_cnm1").inverse();
       }
+      if (from_imu && !rig.world_from_imu) rig.world_from_imu = view.world_from_camera * *from_imu;
       rig.views.push_back(view);
     }
     if (rig.views.empty()) {
@@ -255,14 +267,17 @@ void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
       out << YAML::Key << "max_theta_deg" << YAML::Value
           << view.camera.max_theta * 180 / std::numbers::pi;
     }
-    if (i > 0) {
-      const Eigen::Matrix4d t = source_from_reference(view, rig.views[i - 1]).matrix();
-      out << YAML::Key << "T_cn_cnm1" << YAML::Value << YAML::BeginSeq;
+    const auto motion = [&out](const char* key, const Eigen::Matrix4d& t) {
+      out << YAML::Key << key << YAML::Value << YAML::BeginSeq;
       for (int row = 0; row < 4; ++row) {
         out << YAML::Flow << std::vector<double>{t(row, 0), t(row, 1), t(row, 2), t(row, 3)};
       }
       out << YAML::EndSeq;
+    };
+    if (rig.world_from_imu) {
+      motion("T_cam_imu", (view.world_from_camera.inverse() * *rig.world_from_imu).matrix());
     }
+    if (i > 0) motion("T_cn_cnm1", source_from_reference(view, rig.views[i - 1]).matrix());
     out << YAML::EndMap;
   }
   out << YAML::EndMap;

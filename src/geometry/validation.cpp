@@ -45,6 +45,17 @@ void require_finite(const Camera& c, const std::string& name) {
   }
 }
 
+void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
+  const Eigen::Matrix3d r = pose.linear();
+  if (pose.matrix().allFinite() &&
+      (r.transpose() * r - Eigen::Matrix3d::Identity()).norm() <= 1e-4 && r.determinant() > 0) {
+    return;
+  }
+  throw Error(name +
+              ": the pose is not a rigid motion; its rotation must be orthonormal with "
+              "determinant +1 and all entries finite.");
+}
+
 }  // namespace
 
 void validate(const Camera& c, const std::string& name) {
@@ -91,13 +102,7 @@ void validate(const Rig& rig, const std::string& name) {
   for (const View& view : rig.views) {
     const std::string of_view = name + ": " + view.name;
     validate(view.camera, of_view);
-    const Eigen::Matrix3d r = view.world_from_camera.linear();
-    if (!view.world_from_camera.matrix().allFinite() ||
-        (r.transpose() * r - Eigen::Matrix3d::Identity()).norm() > 1e-4 || r.determinant() < 0) {
-      throw Error(of_view +
-                  ": the pose is not a rigid motion; its rotation must be orthonormal with "
-                  "determinant +1 and all entries finite.");
-    }
+    require_rigid(view.world_from_camera, of_view);
     if (!view.mask.empty() && (view.mask.type() != CV_8UC1 || view.mask.cols != view.camera.width ||
                                view.mask.rows != view.camera.height)) {
       throw Error(of_view + ": the mask is " + std::to_string(view.mask.cols) + "x" +
@@ -106,6 +111,7 @@ void validate(const Rig& rig, const std::string& name) {
                   "; use an 8-bit grey mask of that size.");
     }
   }
+  if (rig.world_from_imu) require_rigid(*rig.world_from_imu, name + ": IMU");
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.views.size(); ++j) {
       if (baseline(rig.views[i], rig.views[j]) > 1e-9) continue;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <random>
@@ -92,6 +94,32 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
+/// X y z are z x y in the camera, which the IMU is beside.
+const char* const beside_imu = R"(:
+  - [0.0, 0.0, 1.0, 0.05]
+  - [1.0, 0.0, 0.0, -0.04]
+  - [0.0, 1.0, 0.0, -0.07]
+  - [0.0, 0.0, 0.0, 1.0]
+)";
+
+Eigen::Isometry3d camera_beside_imu() {
+  Eigen::Isometry3d camera_from_imu = Eigen::Isometry3d::Identity();
+  camera_from_imu.linear() << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  camera_from_imu.translation() << 0.05, -0.04, -0.07;
+  return camera_from_imu;
+}
+
+/// kalibr_text with a transform of one camera.
+std::string with_imu(const std::string& camera, const std::string& key,
+                     const std::string& text = kalibr_text) {
+  return replaced(text, camera + ":\n", camera + ":\n  " + key + beside_imu);
+}
+
+void expect_imu(const Rig& rig, const Eigen::Isometry3d& world_from_imu) {
+  ASSERT_TRUE(rig.world_from_imu.has_value());
+  EXPECT_LT((rig.world_from_imu->matrix() - world_from_imu.matrix()).norm(), 1e-9);
+}
+
 std::string error_of(const std::filesystem::path& path) {
   return test::error_of([&] { read_calibration(path); });
 }
@@ -156,6 +184,48 @@ TEST(Kalibr, ReadsFilesWithOpenCvsHeader) {
   EXPECT_EQ(read_calibration(folder.write("openvins.yaml", text)).rig.views.size(), 2u);
 }
 
+TEST(Kalibr, ReadsWhereTheImuIs) {
+  const TemporaryFolder folder;
+  const auto read = [&](const std::string& text) {
+    return read_calibration(folder.write("chain.yaml", text)).rig;
+  };
+  EXPECT_FALSE(read(kalibr_text).world_from_imu.has_value());
+  expect_imu(read(with_imu("cam0", "T_cam_imu")), camera_beside_imu());
+  expect_imu(read(with_imu("cam0", "T_imu_cam")), camera_beside_imu().inverse());
+  const Rig second = read(with_imu("cam1", "T_cam_imu"));
+  expect_imu(second, second.views[1].world_from_camera * camera_beside_imu());
+}
+
+/// As OpenVINS's files of EuRoC and TUM VI.
+TEST(Kalibr, ReadsPosesThatOnlyTheImuGives) {
+  const TemporaryFolder folder;
+  const Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  Rig to_imu = rig;
+  to_imu.world_from_imu = camera_beside_imu();
+  write_kalibr(folder / "both.yaml", to_imu);
+  std::string text;
+  {
+    std::ifstream stream(folder / "both.yaml");
+    text.assign(std::istreambuf_iterator<char>(stream), {});
+  }
+  const Rig again =
+      read_calibration(folder.write("imu.yaml", replaced(text, "T_cn_cnm1", "unused"))).rig;
+  EXPECT_LT(
+      (again.views[1].world_from_camera.matrix() - rig.views[1].world_from_camera.matrix()).norm(),
+      1e-9);
+}
+
+TEST(Basalt, ReadsWhereTheImuIs) {
+  const TemporaryFolder folder;
+  EXPECT_FALSE(
+      read_calibration(folder.write("calib.json", basalt_text)).rig.world_from_imu.has_value())
+      << "the identity is no IMU";
+  const std::string text = replaced(
+      basalt_text, R"("px": 0.0, "py": 0.0, "pz": 0.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": 1.0)",
+      R"("px": 0.05, "py": -0.04, "pz": -0.07, "qx": 0.5, "qy": 0.5, "qz": 0.5, "qw": 0.5)");
+  expect_imu(read_calibration(folder.write("calib.json", text)).rig, camera_beside_imu().inverse());
+}
+
 TEST(Basalt, ConvertsAlphaFormAndPoses) {
   const TemporaryFolder folder;
   const Calibration c = read_calibration(folder.write("calib.json", basalt_text));
@@ -218,9 +288,11 @@ TEST(OpenCv, ReadsOmnidir) {
 
 TEST(Writing, RoundTripsExactly) {
   const TemporaryFolder folder;
-  const Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
   const auto same = [&](const Rig& again) {
     ASSERT_EQ(again.views.size(), rig.views.size());
+    ASSERT_EQ(again.world_from_imu.has_value(), rig.world_from_imu.has_value());
+    if (rig.world_from_imu) expect_imu(again, *rig.world_from_imu);
     for (std::size_t i = 0; i < rig.views.size(); ++i) {
       const Camera& a = rig.views[i].camera;
       const Camera& b = again.views[i].camera;
@@ -237,12 +309,15 @@ TEST(Writing, RoundTripsExactly) {
           1e-9);
     }
   };
-  write_kalibr(folder / "again.yaml", rig);
-  same(read_calibration(folder / "again.yaml").rig);
-  write_basalt(folder / "again.json", rig);
-  const Calibration json = read_calibration(folder / "again.json");
-  EXPECT_EQ(json.format, CalibrationFormat::basalt);
-  same(json.rig);
+  for (const bool with_imu : {false, true}) {
+    if (with_imu) rig.world_from_imu = camera_beside_imu();
+    write_kalibr(folder / "again.yaml", rig);
+    same(read_calibration(folder / "again.yaml").rig);
+    write_basalt(folder / "again.json", rig);
+    const Calibration json = read_calibration(folder / "again.json");
+    EXPECT_EQ(json.format, CalibrationFormat::basalt);
+    same(json.rig);
+  }
 }
 
 TEST(Writing, RefusesWhatAFormatCannotHold) {
@@ -286,6 +361,9 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect(replaced(kalibr_text, "resolution: [512, 512]", "resolution: [512.5, 512]"), "resolution");
   expect(replaced(kalibr_text, "T_cn_cnm1", "T_cam_imu"), "T_cn_cnm1");
   expect(replaced(kalibr_text, "0.9999994457734953", "1.2"), "rigid");
+  expect(replaced(with_imu("cam0", "T_cam_imu"), "[1.0, 0.0, 0.0, -0.04]", "[1.1, 0.0, 0.0, 0.0]"),
+         "cam0: T_cam_imu is not a rigid motion");
+  expect(replaced(with_imu("cam1", "T_imu_cam"), "-0.04", ".nan"), "cam1: The key T_imu_cam");
   expect(replaced(kalibr_text, "max_theta_deg: 97.5", "max_theta_deg: 400"), "max_theta");
   expect(replaced(replaced(replaced(kalibr_text, "-0.10106110275180535", "0"),
                            "-0.0019764575873431013", "0"),
@@ -354,6 +432,26 @@ TEST(RealCalibrations, AreReadOrRefusedClearly) {
       (basalt.views[1].world_from_camera.matrix() - converted.views[1].world_from_camera.matrix())
           .norm(),
       1e-6);
+}
+
+/// Calibrations of one rig by several tools agree on where its IMU is.
+TEST(RealCalibrations, AgreeOnTheImu) {
+  const auto folder = test::data_folder() / "real/calibrations";
+  if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no calibrations in ../shared/data";
+  const auto expect_agreement = [&](const char* a, const char* b) {
+    const Rig first = read_calibration(folder / a).rig;
+    const Rig second = read_calibration(folder / b).rig;
+    ASSERT_TRUE(first.world_from_imu && second.world_from_imu) << a << " " << b;
+    const Eigen::Isometry3d between = first.world_from_imu->inverse() * *second.world_from_imu;
+    EXPECT_LT(between.translation().norm(), 0.01) << a << " " << b;
+    EXPECT_LT(Eigen::AngleAxisd(between.linear()).angle(), 0.02) << a << " " << b;
+    EXPECT_NEAR(baseline(first.views[0], first.views[1]),
+                baseline(second.views[0], second.views[1]), 1e-3);
+  };
+  expect_agreement("tumvi_official_kalibr/camchain-imucam-imucalib.yaml",
+                   "basalt/tumvi_512_ds_calib.json");
+  expect_agreement("open_vins/tum_vi_kalibr_imucam_chain.yaml", "basalt/tumvi_512_eucm_calib.json");
+  expect_agreement("open_vins/euroc_mav_kalibr_imucam_chain.yaml", "basalt/euroc_ds_calib.json");
 }
 
 }  // namespace

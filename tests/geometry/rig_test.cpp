@@ -52,6 +52,12 @@ TEST(RigValidation, NamesWhatIsWrong) {
   EXPECT_NE(message_of(rig).find("rigid"), std::string::npos);
 
   rig = two_views();
+  rig.world_from_imu = rig.views[1].world_from_camera;
+  EXPECT_EQ(message_of(rig), "");
+  rig.world_from_imu->linear() *= 1.01;
+  EXPECT_NE(message_of(rig).find("IMU: the pose is not a rigid motion"), std::string::npos);
+
+  rig = two_views();
   rig.views[0].mask = cv::Mat(48, 63, CV_8UC1, cv::Scalar(1));
   EXPECT_NE(message_of(rig).find("mask"), std::string::npos);
   rig.views[0].mask = cv::Mat(48, 64, CV_32FC1, cv::Scalar(1));
