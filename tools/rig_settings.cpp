@@ -33,6 +33,7 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
                     std::to_string(image_count) + " images; name one for each image.");
   }
   ws::Rig rig;
+  rig.world_from_imu = all.world_from_imu;
   for (const int view : chosen) {
     if (view < 0 || view >= static_cast<int>(all.views.size())) {
       throw ws::Error(calibration + " has " + std::to_string(all.views.size()) +

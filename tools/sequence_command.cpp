@@ -28,10 +28,14 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+constexpr const char* of_camera = "camera";
+constexpr const char* of_imu = "imu";
+
 struct SequenceArguments {
   std::string dataset;
   std::string output;
   std::string poses;
+  std::string poses_of;           // camera or imu; empty: as the file's layout says
   double poses_tolerance = 0.01;  // seconds
   int first = 0;
   int count = 0;  // 0 = all
@@ -47,10 +51,12 @@ struct SequenceArguments {
   bool as_json = false;
 };
 
-/// Frames to match, with the rig's poses where they are known.
+/// Frames to match, with the rig and its poses where they are known.
 struct Selection {
   std::vector<ws::SequenceFrame> frames;
+  ws::Rig rig;
   std::vector<Eigen::Isometry3d> poses;
+  std::string poses_of;  // camera, imu or, without poses, empty
   std::vector<std::string> names() const {
     std::vector<std::string> names;
     for (const ws::SequenceFrame& frame : frames) names.push_back(frame.name);
@@ -58,33 +64,52 @@ struct Selection {
   }
 };
 
+std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
+  std::vector<cv::Mat> images;
+  for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
+  return images;
+}
+
+/// Reads --poses as poses of the rig, whichever of --poses-of they are of.
+std::vector<ws::StampedPose> read_poses(const SequenceArguments& a, Selection& selection) {
+  ws::Trajectory trajectory = ws::read_trajectory(a.poses);
+  selection.poses_of = a.poses_of;
+  if (a.poses_of.empty()) {
+    selection.poses_of = trajectory.body == ws::Body::imu ? of_imu : of_camera;
+  }
+  if (selection.poses_of == of_camera) return trajectory.poses;
+  if (!selection.rig.world_from_imu) {
+    throw ws::Error(a.poses + " holds poses of the IMU, but " + a.rig.calibration +
+                    " does not say where that is; add its T_cam_imu (Kalibr) or T_imu_cam "
+                    "(Basalt), or give --poses-of camera if they are of camera 0.");
+  }
+  return ws::poses_of_camera(std::move(trajectory.poses), *selection.rig.world_from_imu);
+}
+
 Selection select_frames(const SequenceArguments& a) {
   std::vector<int> cameras = a.rig.views;
   if (cameras.empty()) cameras = {0, 1};
   const auto frames = ws::read_sequence(a.dataset, cameras, a.skip_incomplete);
-  std::vector<Eigen::Isometry3d> poses;
-  if (!a.poses.empty()) {
-    poses = ws::poses_of_frames(frames, ws::read_trajectory(a.poses), a.poses_tolerance, a.poses);
-  }
   if (a.first >= static_cast<int>(frames.size())) {
     throw ws::Error(a.dataset + " has " + std::to_string(frames.size()) +
                     " frames; there is no frame " + std::to_string(a.first) +
                     " to start from (--first counts from 0).");
   }
   Selection selection;
+  std::vector<std::size_t> chosen;
   for (std::size_t i = static_cast<std::size_t>(a.first); i < frames.size();
        i += static_cast<std::size_t>(a.step)) {
-    if (a.count > 0 && selection.frames.size() == static_cast<std::size_t>(a.count)) break;
+    if (a.count > 0 && chosen.size() == static_cast<std::size_t>(a.count)) break;
+    chosen.push_back(i);
     selection.frames.push_back(frames[i]);
-    if (!poses.empty()) selection.poses.push_back(poses[i]);
+  }
+  selection.rig =
+      a.rig.rig_for_images(cameras.size(), read_images(selection.frames.front()).front().size());
+  if (!a.poses.empty()) {
+    selection.poses =
+        ws::poses_of_frames(frames, chosen, read_poses(a, selection), a.poses_tolerance, a.poses);
   }
   return selection;
-}
-
-std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
-  std::vector<cv::Mat> images;
-  for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
-  return images;
 }
 
 void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& images,
@@ -99,14 +124,16 @@ void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& i
   }
 }
 
+Json to_json(const Eigen::Isometry3d& pose) {
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) rows.push_back(pose.matrix()(row, column));
+  }
+  return rows;
+}
+
 Json to_json(const ws::View& view) {
   const ws::Camera& c = view.camera;
-  Json pose = Json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      pose.push_back(view.world_from_camera.matrix()(row, column));
-    }
-  }
   return {{"name", view.name},
           {"model", to_string(c.model)},
           {"size", {c.width, c.height}},
@@ -114,12 +141,12 @@ Json to_json(const ws::View& view) {
            {c.fx, c.fy, c.cx, c.cy, c.skew, c.xi, c.alpha, c.beta, c.omega, c.k1, c.k2, c.k3, c.k4,
             c.p1, c.p2}},
           {"max_theta", c.max_theta},
-          {"world_from_camera", pose},
+          {"world_from_camera", to_json(view.world_from_camera)},
           {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)}};
 }
 
 /// All that decides the results of a frame.
-Json settings_of(const SequenceArguments& a, const ws::Rig& rig, const ws::Options& options,
+Json settings_of(const SequenceArguments& a, const Selection& selection, const ws::Options& options,
                  const ws::DeviceInfo& device) {
   const auto absolute = [](const std::string& path) {
     return path.empty() ? path : fs::absolute(path).lexically_normal().string();
@@ -129,6 +156,7 @@ Json settings_of(const SequenceArguments& a, const ws::Rig& rig, const ws::Optio
                    {"calibration", absolute(a.rig.calibration)},
                    {"masks", a.rig.masks},
                    {"poses", absolute(a.poses)},
+                   {"poses_of", selection.poses_of},
                    {"poses_tolerance", a.poses_tolerance},
                    {"first", a.first},
                    {"step", a.step},
@@ -141,7 +169,10 @@ Json settings_of(const SequenceArguments& a, const ws::Rig& rig, const ws::Optio
                    {"pictures", !a.format.no_pictures},
                    {"device", device.name},
                    {"options", Json::parse(ws::to_json(options))}};
-  for (const ws::View& view : rig.views) settings["views"].push_back(to_json(view));
+  if (selection.poses_of == of_imu) {
+    settings["world_from_imu"] = to_json(*selection.rig.world_from_imu);
+  }
+  for (const ws::View& view : selection.rig.views) settings["views"].push_back(to_json(view));
   return settings;
 }
 
@@ -167,11 +198,9 @@ class SequenceRun {
   SequenceRun(const SequenceArguments& arguments, Selection selection)
       : arguments_(arguments),
         selection_(std::move(selection)),
-        rig_(arguments.rig.rig_for_images(selection_.frames.front().images.size(),
-                                          read_images(selection_.frames.front()).front().size())),
         options_(arguments.settings.options()),
         device_(open_device(arguments.settings)),
-        folder_(arguments.output, settings_of(arguments, rig_, options_, device_.info()),
+        folder_(arguments.output, settings_of(arguments, selection_, options_, device_.info()),
                 arguments.overwrite),
         bar_("Matching on " + device_.info().name) {}
 
@@ -179,7 +208,7 @@ class SequenceRun {
     const std::size_t finished = folder_.finished(selection_.names());
     remaining_ = selection_.frames.size() - finished;
     if (remaining_ == 0) return;
-    ws::Matcher matcher(device_, rig_, options_);
+    ws::Matcher matcher(device_, selection_.rig, options_);
     if (finished > 0) take_up(finished - 1);
     for (std::size_t i = finished; i < selection_.frames.size(); ++i) match(matcher, i);
   }
@@ -203,8 +232,8 @@ class SequenceRun {
 
   void take_up(std::size_t last) {
     const ws::SequenceFrame& frame = selection_.frames[last];
-    previous_ = {read_images(frame), folder_.planes(frame.name, rig_)};
-    require_sizes(frame, previous_.images, rig_);
+    previous_ = {read_images(frame), folder_.planes(frame.name, selection_.rig)};
+    require_sizes(frame, previous_.images, selection_.rig);
     for (const Json& record : folder_.frames()) note_cold(record);
   }
 
@@ -216,7 +245,7 @@ class SequenceRun {
   void match(ws::Matcher& matcher, std::size_t index) {
     const ws::SequenceFrame& source = selection_.frames[index];
     const std::vector<cv::Mat> images = read_images(source);
-    require_sizes(source, images, rig_);
+    require_sizes(source, images, selection_.rig);
     ws::Matcher::Progress progress;
     if (bar_.visible()) {  // without it a device need not wait between kernels
       progress = [this](double share) {
@@ -261,7 +290,7 @@ class SequenceRun {
     } else {
       const auto begin = std::chrono::steady_clock::now();
       start.now_from_previous =
-          ws::estimate_motion(rig_, previous_.images, previous_.views, images);
+          ws::estimate_motion(selection_.rig, previous_.images, previous_.views, images);
       frame.motion = start.now_from_previous ? "estimated" : "not found";
       frame.motion_milliseconds =
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
@@ -289,7 +318,7 @@ class SequenceRun {
                    {"mean_cost", quality.mean_cost}};
     note_cold(record);
     folder_.add(source.name, result.views, [&](const fs::path& folder) {
-      FolderContents contents{.rig = rig_, .images = images, .run = frame.run};
+      FolderContents contents{.rig = selection_.rig, .images = images, .run = frame.run};
       for (const fs::path& image : source.images)
         contents.origin["images"].push_back(image.string());
       contents.origin["calibration"] = arguments_.rig.calibration;
@@ -308,7 +337,6 @@ class SequenceRun {
 
   const SequenceArguments& arguments_;
   Selection selection_;
-  ws::Rig rig_;
   ws::Options options_;
   ws::Device device_;
   SequenceFolder folder_;
@@ -385,8 +413,16 @@ void add_sequence_command(CLI::App& app) {
   const std::string start = "Warm start";
   command
       ->add_option("--poses", a->poses,
-                   "TUM trajectory, camera 0 of the calibration to world; without it the motion is "
-                   "estimated from the images")
+                   "TUM trajectory of camera 0 of the calibration, or ground truth of EuRoC or TUM "
+                   "VI (data.csv, of the IMU), to world; without it the motion is estimated from "
+                   "the images")
+      ->group(start);
+  command
+      ->add_option("--poses-of", a->poses_of,
+                   "What the poses are of: camera (0 of the calibration) or imu (the calibration "
+                   "has T_cam_imu or T_imu_cam); by default as the file's layout says")
+      ->check(CLI::IsMember({of_camera, of_imu}))
+      ->needs("--poses")
       ->group(start);
   command
       ->add_option("--poses-tolerance", a->poses_tolerance,

@@ -27,20 +27,36 @@ std::vector<SequenceFrame> read_sequence(const std::filesystem::path& folder,
                                          const std::vector<int>& cameras,
                                          bool skip_incomplete = false);
 
-/// Pose of the rig at a time.
+/// What poses are of: camera 0 of the calibration, whose frame is the rig's, or the IMU (the body).
+enum class Body { camera, imu };
+
+/// Pose of a body at a time.
 struct StampedPose {
   double seconds = 0;
-  Eigen::Isometry3d world_from_rig = Eigen::Isometry3d::Identity();  ///< metres
+  Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();  ///< metres
 };
 
-/// Reads a TUM trajectory: lines `seconds tx ty tz qx qy qz qw`, # comments. Throws Error naming
-/// the line for anything but eight finite numbers and a quaternion of length 1.
-std::vector<StampedPose> read_trajectory(const std::filesystem::path& path);
+struct Trajectory {
+  std::vector<StampedPose> poses;  ///< in the order of time
+  Body body = Body::camera;        ///< what files of this layout hold
+};
 
-/// The pose of every frame: the one nearest in time, within `tolerance` seconds, where frames have
-/// times; else in their order, where there are as many. Throws Error otherwise; `name` (of the
-/// file) begins the message.
+/// Reads a TUM trajectory (of the camera): lines `seconds tx ty tz qx qy qz qw`; or the ground
+/// truth of EuRoC (mav0/state_groundtruth_estimate0/data.csv) and TUM VI (mav0/mocap0/data.csv) (of
+/// the IMU): lines `nanoseconds,px,py,pz,qw,qx,qy,qz`, further columns ignored. The first line that
+/// is no # comment tells them apart. Throws Error naming the line for anything but finite numbers,
+/// whole nanoseconds, as many columns in every line and a quaternion of length 1.
+Trajectory read_trajectory(const std::filesystem::path& path);
+
+/// The poses of the camera from those of the IMU; with Rig::world_from_imu, those of the rig.
+std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
+                                         const Eigen::Isometry3d& camera_from_imu);
+
+/// The poses of the chosen ones among all frames (by index): the one nearest in time, within
+/// `tolerance` seconds, where frames have times; else in their order, where there are as many.
+/// Throws Error otherwise; `name` (of the file) begins the message.
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
+                                               const std::vector<std::size_t>& chosen,
                                                const std::vector<StampedPose>& trajectory,
                                                double tolerance, const std::string& name);
 

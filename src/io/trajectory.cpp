@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 #include "widestereo/error.h"
@@ -11,54 +14,145 @@
 namespace widestereo {
 namespace {
 
-StampedPose pose_of_line(const std::string& line, const std::string& where) {
+constexpr std::size_t numbers_of_pose = 8;  // time, position, quaternion
+constexpr const char* space = " \t\r";
+
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(space);
+  if (first == std::string::npos) return "";
+  return text.substr(first, text.find_last_not_of(space) + 1 - first);
+}
+
+std::vector<std::string> words_of(const std::string& line, bool comma_separated) {
   std::istringstream stream(line);
-  std::array<double, 8> v{};
+  std::vector<std::string> words;
   std::string word;
-  std::size_t count = 0;
-  while (stream >> word) {
+  if (comma_separated) {
+    while (std::getline(stream, word, ',')) words.push_back(trimmed(word));
+  } else {
+    while (stream >> word) words.push_back(word);
+  }
+  return words;
+}
+
+/// A comma follows the first number.
+bool is_comma_separated(const std::string& line) {
+  const std::size_t after = line.find_first_not_of(space, line.find_first_of(" \t\r,"));
+  return after != std::string::npos && line[after] == ',';
+}
+
+/// The eighth column's name ends in w, before its unit: the quaternion is x y z w.
+bool names_w_last(const std::string& header) {
+  const std::vector<std::string> names = words_of(header, true);
+  if (names.size() < numbers_of_pose) return false;
+  const std::string& last = names[numbers_of_pose - 1];
+  const std::string name = trimmed(last.substr(0, last.find('[')));
+  return !name.empty() && (name.back() == 'w' || name.back() == 'W');
+}
+
+/// How all lines of a file hold poses, told by its first one.
+class PoseLine {
+ public:
+  explicit PoseLine(const std::string& first)
+      : comma_separated_(is_comma_separated(first)),
+        form_(comma_separated_ ? "\"nanoseconds,px,py,pz,qw,qx,qy,qz\""
+                               : "\"seconds tx ty tz qx qy qz qw\""),
+        columns_(comma_separated_
+                     ? std::max(words_of(first, comma_separated_).size(), numbers_of_pose)
+                     : numbers_of_pose) {}
+
+  bool comma_separated() const { return comma_separated_; }
+
+  StampedPose pose(const std::string& line, const std::string& where) const {
+    const std::vector<std::string> words = words_of(line, comma_separated_);
+    if (words.size() != columns_) {
+      throw Error(where + " has " + std::to_string(words.size()) + " numbers instead of " +
+                  std::to_string(columns_) + "; a pose is " + form_ + ".");
+    }
+    std::array<double, numbers_of_pose> v{};
+    for (std::size_t i = 0; i < v.size(); ++i) v[i] = number(words[i], where);
+    const Eigen::Quaterniond rotation = comma_separated_
+                                            ? Eigen::Quaterniond(v[4], v[5], v[6], v[7])
+                                            : Eigen::Quaterniond(v[7], v[4], v[5], v[6]);
+    if (std::abs(rotation.norm() - 1) > 1e-2) {
+      throw Error(where + " has a quaternion of length " + std::to_string(rotation.norm()) +
+                  " instead of 1; a pose is " + form_ + ".");
+    }
+    StampedPose pose;
+    pose.seconds = comma_separated_ ? seconds(words[0], where) : v[0];
+    pose.world_from_body = Eigen::Translation3d(v[1], v[2], v[3]) * rotation.normalized();
+    return pose;
+  }
+
+ private:
+  double number(const std::string& word, const std::string& where) const {
     char* end = nullptr;
     const double value = std::strtod(word.c_str(), &end);
-    if (*end != '\0' || !std::isfinite(value) || count == v.size()) {
-      throw Error(where + " is no \"seconds tx ty tz qx qy qz qw\" of eight finite numbers.");
+    if (word.empty() || *end != '\0' || !std::isfinite(value)) {
+      throw Error(where + " is no " + form_ + " of finite numbers.");
     }
-    v[count++] = value;
+    return value;
   }
-  if (count != v.size()) {
-    throw Error(where + " has " + std::to_string(count) +
-                " numbers; a pose is \"seconds tx ty tz qx qy qz qw\".");
+
+  double seconds(const std::string& word, const std::string& where) const {
+    std::int64_t nanoseconds = 0;
+    const char* end = word.data() + word.size();
+    const auto result = std::from_chars(word.data(), end, nanoseconds);
+    if (result.ec != std::errc() || result.ptr != end) {
+      throw Error(where + " has the time " + word +
+                  ", which is no whole number of nanoseconds; a pose is " + form_ + ".");
+    }
+    return static_cast<double>(nanoseconds) * 1e-9;
   }
-  const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
-  if (std::abs(rotation.norm() - 1) > 1e-2) {
-    throw Error(where + " has a quaternion of length " + std::to_string(rotation.norm()) +
-                " instead of 1; the order is qx qy qz qw.");
-  }
-  StampedPose pose;
-  pose.seconds = v[0];
-  pose.world_from_rig = Eigen::Translation3d(v[1], v[2], v[3]) * rotation.normalized();
-  return pose;
-}
+
+  bool comma_separated_;
+  std::string form_;
+  std::size_t columns_;
+};
 
 }  // namespace
 
-std::vector<StampedPose> read_trajectory(const std::filesystem::path& path) {
+Trajectory read_trajectory(const std::filesystem::path& path) {
   std::ifstream file(path);
   if (!file) throw Error("Cannot read the poses " + path.string() + "; check the path.");
-  std::vector<StampedPose> poses;
-  std::string line;
+  Trajectory trajectory;
+  std::optional<PoseLine> layout;
+  std::string header, line;
   for (int number = 1; std::getline(file, line); ++number) {
-    const std::size_t first = line.find_first_not_of(" \t\r");
-    if (first == std::string::npos || line[first] == '#') continue;
-    poses.push_back(pose_of_line(line, path.string() + " line " + std::to_string(number)));
+    const std::size_t first = line.find_first_not_of(space);
+    if (first == std::string::npos) continue;
+    if (line[first] == '#') {
+      header = line;
+      continue;
+    }
+    if (!layout) {
+      layout.emplace(line.substr(first));
+      if (layout->comma_separated() && names_w_last(header)) {
+        throw Error(path.string() + " names the quaternion's w last; write qw,qx,qy,qz.");
+      }
+    }
+    trajectory.poses.push_back(
+        layout->pose(line, path.string() + " line " + std::to_string(number)));
   }
-  if (poses.empty()) throw Error("There are no poses in " + path.string() + ".");
-  std::stable_sort(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) {
-    return a.seconds < b.seconds;
-  });
-  return poses;
+  if (!layout) throw Error("There are no poses in " + path.string() + ".");
+  if (layout->comma_separated()) trajectory.body = Body::imu;
+  std::stable_sort(
+      trajectory.poses.begin(), trajectory.poses.end(),
+      [](const StampedPose& a, const StampedPose& b) { return a.seconds < b.seconds; });
+  return trajectory;
+}
+
+std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
+                                         const Eigen::Isometry3d& camera_from_imu) {
+  const Eigen::Isometry3d imu_from_camera = camera_from_imu.inverse();
+  for (StampedPose& pose : poses_of_imu) {
+    pose.world_from_body = pose.world_from_body * imu_from_camera;
+  }
+  return poses_of_imu;
 }
 
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
+                                               const std::vector<std::size_t>& chosen,
                                                const std::vector<StampedPose>& trajectory,
                                                double tolerance, const std::string& name) {
   const bool have_times = std::all_of(frames.begin(), frames.end(), [](const SequenceFrame& frame) {
@@ -71,10 +165,11 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
                   std::to_string(frames.size()) +
                   " frames without time stamps; give one pose for each frame.");
     }
-    for (const StampedPose& pose : trajectory) poses.push_back(pose.world_from_rig);
+    for (const std::size_t i : chosen) poses.push_back(trajectory[i].world_from_body);
     return poses;
   }
-  for (const SequenceFrame& frame : frames) {
+  for (const std::size_t i : chosen) {
+    const SequenceFrame& frame = frames[i];
     const double seconds = static_cast<double>(*frame.nanoseconds) * 1e-9;
     const auto apart = [seconds](const StampedPose& pose) {
       return std::abs(pose.seconds - seconds);
@@ -91,7 +186,7 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
                   frame.name + " (the nearest is " + std::to_string(apart(*nearest)) +
                   " s away); check the clocks, choose frames or raise the tolerance.");
     }
-    poses.push_back(nearest->world_from_rig);
+    poses.push_back(nearest->world_from_body);
   }
   return poses;
 }

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // `widestereo sequence` as a user meets it: layouts, resuming, scene cuts, messages.
+#include <Eigen/Geometry>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
+#include <sstream>
 
 #include "command_fixture.h"
 
@@ -114,7 +117,7 @@ TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
 }
 
 TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
-  std::string poses = "# seconds\n";
+  std::string poses = "# seconds, of the frames that are chosen\n";
   for (int camera = 0; camera < 2; ++camera) {
     const std::string name = "cam" + std::to_string(camera);
     fs::create_directories(folder_ / "euroc/mav0" / name);
@@ -122,7 +125,8 @@ TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
     std::string list = "#timestamp [ns],filename\n";
     for (int k = 0; k < 3; ++k) {
       list += "1403636579" + std::to_string(k) + "00000000,00" + std::to_string(k) + ".png\n";
-      if (camera == 0) poses += "1403636579." + std::to_string(k) + "001 0.0 0 0 0 0 0 1\n";
+      if (camera == 0 && k > 0)
+        poses += "1403636579." + std::to_string(k) + "001 0.0 0 0 0 0 0 1\n";
     }
     folder_.write("euroc/mav0/" + name + "/data.csv", list);
   }
@@ -134,6 +138,81 @@ TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_EQ(frames[0]["name"], "001");
   EXPECT_EQ(frames[1]["motion"], "poses");
+}
+
+/// The same motion as poses of camera 0 (TUM) and as ground truth of the IMU (EuRoC).
+class SequencePoses : public SequenceCommand {
+ protected:
+  void SetUp() override {
+    SequenceCommand::SetUp();
+    std::ifstream stream(folder_ / "calib.yaml");
+    std::string text(std::istreambuf_iterator<char>(stream), {});
+    text.insert(text.find("  camera_model"), R"(  T_cam_imu:
+  - [0.0, 0.0, 1.0, 0.05]
+  - [1.0, 0.0, 0.0, -0.04]
+  - [0.0, 1.0, 0.0, -0.07]
+  - [0.0, 0.0, 0.0, 1.0]
+)");
+    folder_.write("imucam.yaml", text);
+    Eigen::Isometry3d camera_from_imu = Eigen::Isometry3d::Identity();
+    camera_from_imu.linear() << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+    camera_from_imu.translation() << 0.05, -0.04, -0.07;
+    std::ostringstream camera_poses, imu_poses;
+    for (std::ostringstream* out : {&camera_poses, &imu_poses}) *out << std::setprecision(17);
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Isometry3d camera =
+          Eigen::Translation3d(0.03 * k, 0.007 * k * k, 0.1 - 0.01 * k) *
+          Eigen::AngleAxisd(0.2 + 0.05 * k, Eigen::Vector3d(1, 2, -2) / 3);
+      const Eigen::Isometry3d imu = camera * camera_from_imu;
+      const Eigen::Quaterniond q(camera.linear()), r(imu.linear());
+      camera_poses << k << ' ' << camera.translation().transpose() << ' ' << q.coeffs().transpose()
+                   << "\n";
+      imu_poses << k << "000000000";
+      for (const double value : {imu.translation().x(), imu.translation().y(),
+                                 imu.translation().z(), r.w(), r.x(), r.y(), r.z()}) {
+        imu_poses << ',' << value;
+      }
+      imu_poses << "\r\n";
+    }
+    folder_.write("camera.txt", camera_poses.str());
+    folder_.write("imu.csv", imu_poses.str());
+  }
+
+  std::string with(const std::string& poses, const std::string& output,
+                   const std::string& calibration = "imucam.yaml") const {
+    return "sequence " + file("data") + " -c " + file(calibration) + " -o " + file(output) + quick +
+           "--warm-iterations 1 --restart-below 0 --poses " + file(poses) + " ";
+  }
+};
+
+TEST_F(SequencePoses, OfTheImuAreThoseOfTheCamera) {
+  for (const std::string options : {"", "--views 1,0 "}) {
+    const Outcome camera = run(with("camera.txt", "camera") + "--overwrite " + options);
+    ASSERT_EQ(camera.exit_code, 0) << camera.output;
+    EXPECT_NE(camera.output.find("warm, motion poses"), std::string::npos) << camera.output;
+    const Outcome imu = run(with("imu.csv", "imu") + "--overwrite " + options);
+    ASSERT_EQ(imu.exit_code, 0) << imu.output;
+    expect_same_results("camera", "imu");
+  }
+  EXPECT_EQ(record("camera")["settings"]["poses_of"], "camera");
+  EXPECT_EQ(record("imu")["settings"]["poses_of"], "imu");
+  EXPECT_EQ(record("imu")["settings"]["world_from_imu"][3], 0.05);
+  ASSERT_EQ(run(with("imu.csv", "wrong") + "--poses-of camera --views 1,0").exit_code, 0);
+  EXPECT_NE(bytes_of(folder_ / "wrong/002/distance0.tiff"),
+            bytes_of(folder_ / "imu/002/distance0.tiff"))
+      << "the motion matters here";
+}
+
+TEST_F(SequencePoses, NeedToBeOfWhatTheCalibrationKnows) {
+  expect_error(with("imu.csv", "out", "calib.yaml"), "calib.yaml does not say where that is");
+  expect_error(with("camera.txt", "out", "calib.yaml") + "--poses-of imu", "T_cam_imu");
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  EXPECT_NE(run(with("imu.csv", "out") + "--poses-of body").exit_code, 0);
+  EXPECT_NE(run(sequence() + "--poses-of imu").output.find("--poses"), std::string::npos);
+  ASSERT_EQ(run(with("imu.csv", "out", "calib.yaml") + "--poses-of camera --count 1").exit_code, 0);
+  const Outcome other = run(with("imu.csv", "out"));
+  EXPECT_EQ(other.exit_code, 1) << "made with poses of another body";
+  EXPECT_NE(other.output.find("--overwrite"), std::string::npos) << other.output;
 }
 
 TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <iomanip>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 #include "error_of.h"
 #include "temporary_folder.h"
@@ -99,11 +101,60 @@ TEST_F(Trajectories, AreReadInOrderOfTime) {
   folder_.write("poses.txt",
                 "# timestamp tx ty tz qx qy qz qw\n2.5 1 2 3 0 0 0.70710678 0.70710678\r\n"
                 "\n 1.5 0 0 0 0 0 0 1\n");
-  const auto poses = read_trajectory(folder_ / "poses.txt");
+  const auto [poses, body] = read_trajectory(folder_ / "poses.txt");
+  EXPECT_EQ(body, Body::camera);
   ASSERT_EQ(poses.size(), 2u);
   EXPECT_EQ(poses[0].seconds, 1.5);
-  const Eigen::Vector3d moved = poses[1].world_from_rig * Eigen::Vector3d(1, 0, 0);
+  const Eigen::Vector3d moved = poses[1].world_from_body * Eigen::Vector3d(1, 0, 0);
   EXPECT_LT((moved - Eigen::Vector3d(1, 3, 3)).norm(), 1e-6) << "a quarter turn about z";
+}
+
+/// The ground truth of EuRoC and of TUM VI: columns of velocities and biases, or none.
+TEST_F(Trajectories, GroundTruthOfTheImuGivesPosesOfTheCamera) {
+  const Eigen::Isometry3d camera_from_imu =
+      Eigen::Translation3d(0.05, -0.047, -0.068) *
+      Eigen::AngleAxisd(1.7, Eigen::Vector3d(1, -2, 0.5).normalized());
+  std::ostringstream tum, euroc, tumvi;
+  for (std::ostringstream* text : {&tum, &euroc, &tumvi}) *text << std::setprecision(17);
+  euroc << "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+           "q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1]\n";
+  tumvi << "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], "
+           "q_RS_y [], q_RS_z []\r\n";
+  for (int k = 0; k < 4; ++k) {
+    const Eigen::Isometry3d camera = Eigen::Translation3d(k - 1.5, 0.3 * k * k, 2 - 0.7 * k) *
+                                     Eigen::AngleAxisd(0.9 * k, Eigen::Vector3d(0.6, 0, -0.8));
+    const auto time = std::to_string(1403636579 + k) + ".763555584";
+    const auto nanoseconds = std::to_string(1403636579 + k) + "763555584";
+    const auto append = [](std::ostream& text, const Eigen::Isometry3d& pose, char by,
+                           bool w_last) {
+      const Eigen::Vector3d p = pose.translation();
+      const Eigen::Quaterniond q(pose.linear());
+      text << by << p.x() << by << p.y() << by << p.z();
+      if (!w_last) text << by << q.w();
+      text << by << q.x() << by << q.y() << by << q.z();
+      if (w_last) text << by << q.w();
+    };
+    append(tum << time, camera, ' ', true);
+    append(euroc << nanoseconds, camera * camera_from_imu, ',', false);
+    append(tumvi << nanoseconds, camera * camera_from_imu, ',', false);
+    tum << "\n";
+    euroc << ", 0.1, nan, -3e-4\n";
+    tumvi << "\r\n";
+  }
+  folder_.write("tum.txt", tum.str());
+  const auto expected = read_trajectory(folder_ / "tum.txt").poses;
+  ASSERT_EQ(expected.size(), 4u);
+  for (const std::string& text : {euroc.str(), tumvi.str()}) {
+    const Trajectory imu = read_trajectory(folder_.write("data.csv", text));
+    EXPECT_EQ(imu.body, Body::imu);
+    const auto poses = poses_of_camera(imu.poses, camera_from_imu);
+    ASSERT_EQ(poses.size(), 4u);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(poses[k].seconds, expected[k].seconds, 3e-7);
+      EXPECT_LT((poses[k].world_from_body.matrix() - expected[k].world_from_body.matrix()).norm(),
+                1e-9);
+    }
+  }
 }
 
 TEST_F(Trajectories, BrokenLinesAreNamed) {
@@ -116,26 +167,57 @@ TEST_F(Trajectories, BrokenLinesAreNamed) {
   EXPECT_THAT(error_of_text("1 2 3 4 1 1 0 1\n"), HasSubstr("quaternion"));
 }
 
+TEST_F(Trajectories, BrokenLinesOfGroundTruthAreNamed) {
+  const std::string header = "#timestamp [ns], p_x, p_y, p_z, q_RS_w [], q_x, q_y, q_RS_z []\n";
+  const std::string whole = header + "1403636579763555584,1,2,3,0.5,0.5,-0.5,0.5,9\r\n";
+  const auto expect = [&](const std::string& text, const std::string& part) {
+    EXPECT_THAT(error_of_text(text), HasSubstr(part));
+    EXPECT_THAT(error_of_text(text), HasSubstr((folder_ / "poses.txt").string()));
+  };
+  EXPECT_EQ(error_of_text(whole), "");
+  EXPECT_EQ(error_of_text("5 , 1,2,3,1,0,0,0\n"), "");
+  expect(header, "no poses");
+  expect(header + "\r\n \r\n", "no poses");
+  expect(whole + "1403636579768555520,1,2,3,0.5,0.5,-0.5,0.5\n",
+         "line 3 has 8 numbers instead of 9");
+  expect(whole + "14036365", "line 3 has 1 numbers instead of 9");
+  expect("1,2,3,4,1,0,0\n", "line 1 has 7 numbers instead of 8; a pose is \"nanoseconds,px");
+  expect("1,2,3,4,1,0,0,\n", "line 1 has 7 numbers");
+  expect("1,2,,4,1,0,0,0\n", "line 1 is no \"nanoseconds,px,py,pz,qw,qx,qy,qz\" of finite");
+  expect("1,2,nan,4,1,0,0,0\n", "finite");
+  expect("1,2,3,4 m,1,0,0,0\n", "finite");
+  expect(whole + "1 2 3 4 0 0 0 1\n", "line 3 has 1 numbers instead of 9");
+  expect("1,2,3,4,0,0,0,0\n", "line 1 has a quaternion of length 0");
+  expect("1,2,3,4,1,1,0,0\n", "quaternion of length 1.4");
+  expect("#t,x,y,z,q_x [],q_y [],q_z [],q_w []\n1,2,3,4,0,0,0,1\n", "write qw,qx,qy,qz");
+  expect("1403636579.76,2,3,4,1,0,0,0\n", "the time 1403636579.76, which is no whole number");
+  expect("1.4e18,2,3,4,1,0,0,0\n", "nanoseconds");
+  expect("99999999999999999999,2,3,4,1,0,0,0\n", "nanoseconds");
+}
+
 TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   std::vector<StampedPose> trajectory(3);
   for (int i = 0; i < 3; ++i) {
     trajectory[i].seconds = 10 + 0.1 * i;
-    trajectory[i].world_from_rig.translation().x() = i;
+    trajectory[i].world_from_body.translation().x() = i;
   }
   std::vector<SequenceFrame> frames(3);
-  EXPECT_EQ(poses_of_frames(frames, trajectory, 0.01, "p")[2].translation().x(), 2);
+  EXPECT_EQ(poses_of_frames(frames, {0, 2}, trajectory, 0.01, "p")[1].translation().x(), 2);
   frames.pop_back();
-  EXPECT_THAT(error_of([&] { poses_of_frames(frames, trajectory, 0.01, "p"); }),
+  EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, trajectory, 0.01, "p"); }),
               HasSubstr("3 poses for 2 frames"));
   frames[0].nanoseconds = 10'204'000'000;
   frames[1].nanoseconds = 10'098'000'000;
-  const auto poses = poses_of_frames(frames, trajectory, 0.01, "p");
+  const auto poses = poses_of_frames(frames, {0, 1}, trajectory, 0.01, "p");
   EXPECT_EQ(poses[0].translation().x(), 2);
   EXPECT_EQ(poses[1].translation().x(), 1);
   frames[1].name = "late";
   frames[1].nanoseconds = 10'150'000'000;
-  EXPECT_THAT(error_of([&] { poses_of_frames(frames, trajectory, 0.01, "p"); }),
+  EXPECT_THAT(error_of([&] {
+                poses_of_frames(frames, {0, 1}, trajectory, 0.01, "p");
+              }),
               HasSubstr("frame late"));
+  EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
 }
 
 }  // namespace
