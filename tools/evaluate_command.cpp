@@ -33,9 +33,7 @@ cv::Mat read_mask(const fs::path& path) {
 
 /// 8-bit grey levels of any image.
 cv::Mat read_grey(const fs::path& path) {
-  cv::Mat grey;
-  ws::to_intensity(ws::read_image(path), path.string()).convertTo(grey, CV_8U, 255);
-  return grey;
+  return ws::to_grey_levels(ws::read_image(path), path.string());
 }
 
 /// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),

@@ -115,8 +115,7 @@ cv::Mat grey_levels(const std::string& file, const ws::View& view) {
   if (image.cols != view.camera.width || image.rows != view.camera.height) {
     throw ws::Error(file + " has another size than the calibration of " + view.name + ".");
   }
-  cv::Mat grey;
-  ws::to_intensity(image, file).convertTo(grey, CV_8U, 255);
+  cv::Mat grey = ws::to_grey_levels(image, file);
   if (!view.mask.empty()) grey.setTo(0, view.mask == 0);
   return grey;
 }

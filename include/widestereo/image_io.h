@@ -25,6 +25,9 @@ cv::Mat read_image(const std::filesystem::path& path);
 /// message.
 cv::Mat to_intensity(const cv::Mat& image, const std::string& name);
 
+/// The same as grey levels 0 to 255, CV_8UC1.
+cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
+
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm or .png (16 bit, divided
 /// by `png_scale`, which is the PNG units per metre). Throws Error.
 cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);

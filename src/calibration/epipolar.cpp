@@ -25,8 +25,7 @@ struct Features {
 
 /// SIFT on a contrast-equalised image, descriptors in Hellinger form (square roots of shares).
 Features detect(const cv::Mat& image, const std::string& name) {
-  cv::Mat grey;
-  to_intensity(image, name).convertTo(grey, CV_8U, 255);
+  cv::Mat grey = to_grey_levels(image, name);
   cv::createCLAHE(3, {8, 8})->apply(grey, grey);
   Features features;
   cv::SIFT::create(6000)->detectAndCompute(grey, {}, features.points, features.descriptors);

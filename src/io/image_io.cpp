@@ -158,6 +158,12 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
   return intensity;
 }
 
+cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name) {
+  cv::Mat grey;
+  to_intensity(image, name).convertTo(grey, CV_8U, 255);
+  return grey;
+}
+
 cv::Mat read_map(const fs::path& path, double png_scale) {
   const std::string extension = extension_of(path);
   if (extension == ".pfm") return read_pfm(path, read_bytes(path));
