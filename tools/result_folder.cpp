@@ -40,7 +40,8 @@ class ViewWriter {
     write_maps();
     if (!format_.no_cloud) write_cloud();
     if (!format_.no_pictures) write_pictures();
-    const ws::ConsistencyScores scores = ws::consistency_scores(result_.differences, result_.cost);
+    const ws::ConsistencyScores scores =
+        ws::consistency_scores(result_.differences, result_.cost, textured_pixels());
     return {{"name", view_.name},
             {"model", to_string(view_.camera.model)},
             {"width", view_.camera.width},
@@ -50,12 +51,20 @@ class ViewWriter {
             {"filled", share_of_usable(result_, (result_.reasons & ws::reason_filled) != 0)},
             {"mean_cost", scores.mean_cost},
             {"cost_below_0.2", scores.low_cost},
+            {"cost_below_0.2_textured", scores.low_cost_textured},
+            {"textured_pixels", scores.textured},
             {"consistent_within_2_percent", scores.consistent_relative},
             {"consistent_within_2_pixels", scores.consistent_pixels},
             {"files", files_}};
   }
 
  private:
+  cv::Mat textured_pixels() const {
+    return ws::textured_pixels(
+        ws::to_grey_levels(contents_.images[index_], "The image of " + view_.name),
+        (result_.reasons & ws::reason_no_ray) == 0);
+  }
+
   fs::path named(const std::string& what, const std::string& extension) {
     const std::string name = what + std::to_string(index_) + extension;
     files_[what + extension] = name;
@@ -212,11 +221,11 @@ void report(const Json& record, const fs::path& folder, bool as_json) {
               record["options"]["preset"].get<std::string>().c_str());
   for (const auto& view : record["views"]) {
     std::printf(
-        "%s: %.1f %% accepted, mean cost %.3f, cost < 0.2 %.1f %%, left-right within 2 %% %.1f %%, "
-        "within "
-        "2 px %.1f %%\n",
+        "%s: %.1f %% accepted, mean cost %.3f, cost < 0.2 %.1f %% (%.1f %% of textured pixels), "
+        "left-right within 2 %% %.1f %%, within 2 px %.1f %%\n",
         view["name"].get<std::string>().c_str(), 100 * view["accepted"].get<double>(),
         view["mean_cost"].get<double>(), 100 * view["cost_below_0.2"].get<double>(),
+        100 * view["cost_below_0.2_textured"].get<double>(),
         100 * view["consistent_within_2_percent"].get<double>(),
         100 * view["consistent_within_2_pixels"].get<double>());
   }

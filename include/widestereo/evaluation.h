@@ -27,6 +27,10 @@ struct GroundTruth {
 constexpr int texture_patch_side = 9;          ///< pixels
 constexpr double texture_least_deviation = 4;  ///< grey levels
 
+/// 255 where the image (CV_8UC1, grey levels) is textured, else 0; `field_of_view`: CV_8UC1, 0 =
+/// outside.
+cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& field_of_view);
+
 /// An edge of the true scene runs between horizontal or vertical neighbours, both inside the
 /// camera's field of view, if the larger of their true distances exceeds the smaller by more than
 /// this share of it, if their true normals differ by more than this angle, or if only one has a
@@ -93,13 +97,16 @@ struct ConsistencyScores {
   double consistent_relative = 0;  ///< left-right difference of distance at most 2 %
   double consistent_pixels = 0;    ///< left-right displacement at most 2 px
   double low_cost = 0;             ///< cost 1 - ZNCC below 0.2
+  double low_cost_textured = 0;    ///< the same, of the textured pixels with a plane
   double mean_cost = 0;
   long pixels = 0;
+  long textured = 0;  ///< of these
 };
 
 /// `differences`: CV_32FC2, relative difference and displacement in pixels; `cost`: CV_32FC1, 2 =
-/// no plane.
-ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost);
+/// no plane; `textured`: empty (none is), or as textured_pixels() gives it.
+ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost,
+                                     const cv::Mat& textured = {});
 
 /// One point of a sparsification curve: error of the most confident pixels.
 struct SparsificationPoint {

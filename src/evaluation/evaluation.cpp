@@ -102,27 +102,6 @@ cv::Mat inside_field_of_view(const cv::Mat& rays) {
   return valid > 0;
 }
 
-/// 255 where the patch around the pixel has texture.
-cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& rays) {
-  cv::Mat value;
-  image.convertTo(value, CV_64F);
-  cv::Mat weight;
-  inside_field_of_view(rays).convertTo(weight, CV_64F, 1 / 255.0);
-  value = value.mul(weight);
-  const auto patch_sum = [](const cv::Mat& map) {
-    cv::Mat sum;
-    cv::boxFilter(map, sum, CV_64F, {texture_patch_side, texture_patch_side}, {-1, -1}, false,
-                  cv::BORDER_CONSTANT);
-    return sum;
-  };
-  const cv::Mat count = patch_sum(weight);
-  const cv::Mat sum = patch_sum(value);
-  // Whole numbers, so the comparison is exact.
-  const cv::Mat variance = count.mul(patch_sum(value.mul(value))) - sum.mul(sum);
-  const cv::Mat least = texture_least_deviation * texture_least_deviation * count.mul(count);
-  return (variance >= least) & (count > 0);
-}
-
 bool is_edge(const GroundTruth& truth, cv::Point a, cv::Point b) {
   const float first = truth.distance.at<float>(a);
   const float second = truth.distance.at<float>(b);
@@ -268,6 +247,26 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
 
 }  // namespace
 
+cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& field_of_view) {
+  cv::Mat value;
+  image.convertTo(value, CV_64F);
+  cv::Mat weight;
+  cv::Mat(field_of_view != 0).convertTo(weight, CV_64F, 1 / 255.0);
+  value = value.mul(weight);
+  const auto patch_sum = [](const cv::Mat& map) {
+    cv::Mat sum;
+    cv::boxFilter(map, sum, CV_64F, {texture_patch_side, texture_patch_side}, {-1, -1}, false,
+                  cv::BORDER_CONSTANT);
+    return sum;
+  };
+  const cv::Mat count = patch_sum(weight);
+  const cv::Mat sum = patch_sum(value);
+  // Whole numbers, so the comparison is exact.
+  const cv::Mat variance = count.mul(patch_sum(value.mul(value))) - sum.mul(sum);
+  const cv::Mat least = texture_least_deviation * texture_least_deviation * count.mul(count);
+  return (variance >= least) & (count > 0);
+}
+
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source) {
@@ -293,7 +292,7 @@ std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& norma
       band(">90 deg", 90, 181)};
   if (!truth.image.empty()) {
     const cv::Mat rays = ray_image(reference.camera, {});
-    const cv::Mat textured = textured_pixels(truth.image, rays);
+    const cv::Mat textured = textured_pixels(truth.image, inside_field_of_view(rays));
     const cv::Mat interior = textured & interior_pixels(truth, rays);
     const auto within = [&](const std::string& region, const cv::Mat& mask) {
       return score_where(region, [&mask](const Sample& s) {
@@ -338,7 +337,8 @@ FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const Vi
   return scores;
 }
 
-ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost) {
+ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost,
+                                     const cv::Mat& textured) {
   ConsistencyScores scores;
   for (int y = 0; y < cost.rows; ++y) {
     for (int x = 0; x < cost.cols; ++x) {
@@ -350,11 +350,15 @@ ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& 
       scores.low_cost += c < 0.2f;
       scores.consistent_relative += difference[0] <= 0.02f;
       scores.consistent_pixels += difference[1] <= 2.0f;
+      if (textured.empty() || textured.at<uchar>(y, x) == 0) continue;
+      ++scores.textured;
+      scores.low_cost_textured += c < 0.2f;
     }
   }
   const double n = static_cast<double>(std::max(scores.pixels, 1L));
   scores.mean_cost /= n;
   scores.low_cost /= n;
+  scores.low_cost_textured /= static_cast<double>(std::max(scores.textured, 1L));
   scores.consistent_relative /= n;
   scores.consistent_pixels /= n;
   return scores;

@@ -46,6 +46,29 @@ TEST_F(Command, DepthWritesEveryFormatAndJson) {
   EXPECT_TRUE(fs::exists(folder_ / "out/distance0.pfm"));
 }
 
+TEST_F(Command, DepthScoresTexturedPixels) {
+  for (const char* name : {"left.png", "right.png"}) {
+    cv::Mat image = cv::imread(file(name));
+    image.rowRange(0, 48).setTo(100);
+    cv::imwrite(file(name), image);
+  }
+  const Outcome outcome = run(depth_of("left.png", "right.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find(" % of textured pixels), left-right"), std::string::npos)
+      << outcome.output;
+  std::ifstream stream(folder_ / "out/result.json");
+  const nlohmann::json view = nlohmann::json::parse(stream)["views"][0];
+  const cv::Mat cost = cv::imread(file("out/cost0.tiff"), cv::IMREAD_UNCHANGED);
+  // Patches of 9x9 reach four rows into the blank half.
+  const cv::Mat textured = cost.rowRange(44, 96);
+  const int planes = cv::countNonZero(textured < 2);
+  EXPECT_EQ(view["textured_pixels"], planes);
+  EXPECT_GT(planes, 2000);
+  EXPECT_NEAR(view["cost_below_0.2_textured"], cv::countNonZero(textured < 0.2f) / double(planes),
+              1e-9);
+  EXPECT_LT(view["cost_below_0.2"], view["cost_below_0.2_textured"]) << "the wall has no low cost";
+}
+
 TEST_F(Command, BadImagesAreNamed) {
   folder_.write("empty.png", "");
   folder_.write("garbage.png", "this is no image");

@@ -235,6 +235,27 @@ TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   EXPECT_NEAR(s.mean_cost, 0.5 / 3, 1e-6);
 }
 
+/// The left half is blank: textured from column 19.
+TEST_F(TexturedScene, LowCostIsAlsoCountedWhereThereIsTexture) {
+  const cv::Mat field_of_view(rows, columns, CV_8UC1, cv::Scalar(255));
+  const cv::Mat textured = textured_pixels(truth_.image, field_of_view);
+  EXPECT_EQ(cv::countNonZero(textured.colRange(0, 19)), 0);
+  EXPECT_EQ(cv::countNonZero(textured.colRange(19, columns)), 21 * 24);
+  cv::Mat cost(rows, columns, CV_32FC1, cv::Scalar(1));
+  cost.colRange(19, columns).setTo(0.1);
+  cost.row(0).setTo(2);  // no plane
+  cost.row(1).colRange(19, columns).setTo(0.5);
+  const cv::Mat differences(rows, columns, CV_32FC2, cv::Scalar(0, 0));
+  const ConsistencyScores s = consistency_scores(differences, cost, textured);
+  EXPECT_EQ(s.textured, 21 * 23);
+  EXPECT_NEAR(s.low_cost_textured, 22 / 23.0, 1e-9);
+  EXPECT_NEAR(s.low_cost, 22 * 21 / (23.0 * 40), 1e-9);
+  const ConsistencyScores without = consistency_scores(differences, cost);
+  EXPECT_EQ(without.textured, 0);
+  EXPECT_EQ(without.low_cost_textured, 0);
+  EXPECT_EQ(without.low_cost, s.low_cost);
+}
+
 TEST(Evaluation, SparsificationFallsWhenConfidenceIsRight) {
   const RenderedPair pair = render_demo(96);
   const GroundTruth& truth = pair.views[0].truth;
