@@ -152,6 +152,8 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"normals",
        "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
       {"cost", "1 - ZNCC in [0, 2]; 2 = no plane, 1 = no texture"},
+      {"textured_pixels",
+       "pixels with a plane and a standard deviation of at least 4 grey levels in 9x9 pixels"},
       {"confidence",
        "probability that the point is within 2 px of its true place in the other view; 0 = no "
        "plane of its own"},
