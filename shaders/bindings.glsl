@@ -14,6 +14,8 @@ layout(constant_id = 3) const int VIEW_COUNT = 2;
 layout(constant_id = 4) const bool SAMPLED = true;
 layout(constant_id = 5) const int PATTERN = 0;
 layout(constant_id = 6) const int WEIGHTED = 0;
+layout(constant_id = 7) const int FILTER = 0;
+#define HAS_DEVICE_FILTER
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
 layout(set = 0, binding = 1) uniform sampler2DArray intensity_texture;
@@ -28,19 +30,25 @@ layout(push_constant) uniform PassBlock { PassParameters pass; };
 vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, ivec3(p, view)); }
 
 float intensity_at(int view, ivec2 p) {
-  if (SAMPLED) return texelFetch(intensity_texture, ivec3(p, view), 0).x;
-  return imageLoad(intensities, ivec3(p, view)).x;
+  ivec3 texel = ivec3(p + APRON, view);
+  if (SAMPLED) return texelFetch(intensity_texture, texel, 0).x;
+  return imageLoad(intensities, texel).x;
 }
 
 vec4 intensity_taps(int view, ivec2 p) {
   if (SAMPLED) {
     // The corner that the four texels share lies half a texel from any rounding trouble.
     vec2 texel = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
-    vec4 taps = textureGather(intensity_texture, vec3((vec2(p) + 1.0f) * texel, float(view)));
+    vec4 taps = textureGather(intensity_texture, vec3(vec2(p + APRON + 1) * texel, float(view)));
     return vec4(taps.w, taps.z, taps.x, taps.y);
   }
   return vec4(intensity_at(view, p), intensity_at(view, p + ivec2(1, 0)),
               intensity_at(view, p + ivec2(0, 1)), intensity_at(view, p + ivec2(1, 1)));
+}
+
+float filtered_intensity_at(int view, vec2 p) {
+  vec2 texel = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
+  return textureLod(intensity_texture, vec3((p + (float(APRON) + 0.5f)) * texel, float(view)), 0.0f).x;
 }
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }
@@ -48,7 +56,7 @@ vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, vi
 void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, ivec3(p, view), h); }
 
 void store_intensity(int view, ivec2 p, float intensity) {
-  imageStore(intensities, ivec3(p, view), vec4(intensity, 0.0f, 0.0f, 0.0f));
+  imageStore(intensities, ivec3(p + APRON, view), vec4(intensity, 0.0f, 0.0f, 0.0f));
 }
 
 vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, VIEW_COUNT + view)); }

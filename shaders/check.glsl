@@ -28,9 +28,7 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   float sum_squares = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
     for (int dx = -WINDOW_RADIUS; dx <= WINDOW_RADIUS; ++dx) {
-      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
-      float a = intensity_at(CONTEXT PASS.reference, q);
+      float a = intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + dx, pixel.y + dy));
       if (a < 0.0f) continue;
       a -= centre;
       n += 1.0f;

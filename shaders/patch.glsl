@@ -9,24 +9,29 @@
 #define WARP_AFFINE 1
 #define WARP_QUADRATIC 2
 
+#define FILTER_EXACT 0
+#define FILTER_DEVICE 1
+
 FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
-// Bilinear intensity with exact weights; false outside the image or next to a masked pixel.
-FN bool sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 position, OUT(float) intensity) {
-  intensity = 0.0f;
-  bool inside = position.x >= 0.0f && position.y >= 0.0f && position.x <= float(size.x - 1) &&
-                position.y <= float(size.y - 1);
-  if (!inside) return false;
-  ivec2 corner = ivec2(min(int(position.x), size.x - 2), min(int(position.y), size.y - 2));
-  float fx = position.x - float(corner.x);
-  float fy = position.y - float(corner.y);
-  vec4 taps = intensity_taps(CONTEXT view, corner);
-  float top = taps.x + fx * (taps.y - taps.x);
-  float bottom = taps.z + fx * (taps.w - taps.z);
-  intensity = top + fy * (bottom - top);
-  return min(min(taps.x, taps.y), min(taps.z, taps.w)) >= 0.0f;
+// Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others, and every image
+// is surrounded by masked ones. The weights are exact, or those of the texture units (1/256 on most GPUs).
+FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 position) {
+#ifdef HAS_DEVICE_FILTER
+  if (FILTER == FILTER_DEVICE) return filtered_intensity_at(CONTEXT view, position);
+#endif
+  // The limit comes first: then it also replaces what is no number.
+  float x = min(float(size.x), max(-1.0f, position.x));
+  float y = min(float(size.y), max(-1.0f, position.y));
+  float left = floor(x);
+  float top = floor(y);
+  vec4 taps = intensity_taps(CONTEXT view, ivec2(int(left), int(top)));
+  float across = x - left;
+  float upper = taps.x + across * (taps.y - taps.x);
+  float lower = taps.z + across * (taps.w - taps.z);
+  return upper + (y - top) * (lower - upper);
 }
 
 // Projects the plane's point on one reference ray into a source; false where the plane is not in front.
@@ -132,12 +137,28 @@ FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int m
   return has_x && has_y;
 }
 
-FN vec2 map_offset(PatchMap map, int warp, float x, float y) {
-  vec2 u = map.u0 + x * map.ux + y * map.uy;
-  if (warp == WARP_QUADRATIC) {
-    u = u + x * x * map.uxx + x * y * map.uxy + y * y * map.uyy;
+// The part of the map for one row of the patch: start + x (slope + x bend).
+struct RowMap {
+  vec2 start;
+  vec2 slope;
+  vec2 bend;
+};
+
+FN RowMap map_row(CONTEXT_ARGUMENT PatchMap map, float y) {
+  RowMap row;
+  row.start = map.u0 + y * map.uy;
+  row.slope = map.ux;
+  row.bend = map.uxx;
+  if (WARP == WARP_QUADRATIC) {
+    row.start = row.start + (y * y) * map.uyy;
+    row.slope = row.slope + y * map.uxy;
   }
-  return u;
+  return row;
+}
+
+FN vec2 map_offset(CONTEXT_ARGUMENT RowMap row, float x) {
+  if (WARP == WARP_QUADRATIC) return row.start + x * (row.slope + x * row.bend);
+  return row.start + x * row.slope;
 }
 
 // 1 - ZNCC in [0, 2] of sums over n samples; a patch without texture carries no information.
@@ -164,7 +185,7 @@ FN int first_column(CONTEXT_ARGUMENT int row) {
 // which loops read once.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
   if (WEIGHTED == 0) return 1.0f;
-  return exp(-abs(difference) * inverse_scale);
+  return exp2(-abs(difference) * inverse_scale);
 }
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
@@ -172,17 +193,15 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   int reference = PASS.reference;
   ViewPair pair = PARAMETERS.pairs[reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
-  ivec4 size = PARAMETERS.cameras[reference].size;
   int model = SOURCE_MODEL >= 0 ? SOURCE_MODEL : camera.size.z;
   if (side_of_source(pair, m) <= 0.0f) return INVALID_COST;
 
   // Sums are taken relative to the centre's intensities: single precision then suffices.
   vec2 centre;
-  float centre_b;
   if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return INVALID_COST;
-  if (!sample_image(CONTEXT source, camera.size, centre, centre_b)) return INVALID_COST;
+  float centre_b = sample_image(CONTEXT source, camera.size, centre);
   float centre_a = intensity_at(CONTEXT reference, pixel);
-  if (centre_a < 0.0f) return INVALID_COST;
+  if (!(min(centre_a, centre_b) >= 0.0f)) return INVALID_COST;
 
   PatchMap map;
   if (WARP != WARP_EXACT) {
@@ -198,24 +217,28 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_bb = 0.0f;
   float sum_ab = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-    for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
+    RowMap row;
+    if (WARP != WARP_EXACT) row = map_row(CONTEXT map, float(dy));
+    UNROLL for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      if (!in_image(size, q)) continue;
       float a = intensity_at(CONTEXT reference, q);
-      if (a < 0.0f) continue;
+      bool seen = a >= 0.0f;
       a -= centre_a;
-      float weight = sample_weight(CONTEXT a, inverse_scale);
+      float weight = seen ? sample_weight(CONTEXT a, inverse_scale) : 0.0f;
       of_patch += weight;
       vec2 position;
       if (WARP == WARP_EXACT) {
+        if (!seen) continue;
         vec4 ray = ray_at(CONTEXT reference, q);
         if (!warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position)) continue;
       } else {
-        position = map_offset(map, WARP, float(dx), float(dy));
+        position = map_offset(CONTEXT row, float(dx));
       }
-      float b;
-      if (!sample_image(CONTEXT source, camera.size, position, b)) continue;
-      b -= centre_b;
+      float b = sample_image(CONTEXT source, camera.size, position);
+      // Without branches: most samples are seen.
+      seen = b >= 0.0f;
+      weight = seen ? weight : 0.0f;
+      b = seen ? b - centre_b : 0.0f;
       float weighted_a = weight * a;
       float weighted_b = weight * b;
       n += weight;

@@ -12,13 +12,12 @@ FN void downsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float n = 0.0f;
   for (int i = 0; i < 4; ++i) {
     ivec2 q = ivec2(2 * pixel.x + (i & 1), 2 * pixel.y + (i >> 1));
-    if (!in_image(PARAMETERS.cameras[PASS.other].size, q)) continue;
     float a = intensity_at(CONTEXT PASS.other, q);
     if (a < 0.0f) continue;
     sum += a;
     n += 1.0f;
   }
-  store_intensity(CONTEXT PASS.reference, pixel, n >= 3.0f ? sum / n : -1.0f);
+  store_intensity(CONTEXT PASS.reference, pixel, n >= 3.0f ? sum / n : MASKED_INTENSITY);
 }
 
 // Starts a pixel from fronto-spherical planes at PASS.steps inverse distances over the whole range.

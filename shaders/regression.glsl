@@ -61,7 +61,6 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     speed = length(velocity);
     vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
     vec2 direction = reference_direction(CONTEXT source, pixel, m, along);
-    ivec4 size = PARAMETERS.cameras[PASS.reference].size;
     float centre = intensity_at(CONTEXT PASS.reference, pixel);
     float information = 0.0f;
     float n = 0.0f;
@@ -70,7 +69,6 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
       for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-        if (q.x < 1 || q.y < 1 || q.x >= size.x - 1 || q.y >= size.y - 1) continue;
         float a = intensity_at(CONTEXT PASS.reference, q);
         float left = intensity_at(CONTEXT PASS.reference, ivec2(q.x - 1, q.y));
         float right = intensity_at(CONTEXT PASS.reference, ivec2(q.x + 1, q.y));

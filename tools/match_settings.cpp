@@ -4,6 +4,7 @@
 #include <map>
 
 using widestereo::DistanceSampling;
+using widestereo::Filter;
 using widestereo::Options;
 using widestereo::PatchPattern;
 using widestereo::PatchWarp;
@@ -67,6 +68,9 @@ void MatchSettings::add_to(CLI::App& command) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, PatchPattern>{
           {"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
   add("--weight-scale", weight_scale, "Intensity scale of patch weights, grey levels; 0 = none");
+  add("--filter", filter, "Intensities between pixels: exact, or device (texture units of a GPU)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, Filter>{{"exact", Filter::exact}, {"device", Filter::device}}));
   add("--levels", levels, "Levels of the image pyramid");
   add("--sweep-steps", sweep_steps, "Inverse distances tried at the coarsest level");
   add("--level-iterations", level_iterations, "Iterations of each level, coarsest first")
@@ -124,6 +128,7 @@ Options MatchSettings::options() const {
   take(options.refinements, refinements);
   take(options.pattern, pattern);
   take(options.weight_scale, weight_scale);
+  take(options.filter, filter);
   take(options.levels, levels);
   take(options.sweep_steps, sweep_steps);
   take(options.level_iterations, level_iterations);

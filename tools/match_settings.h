@@ -28,6 +28,7 @@ struct MatchSettings {
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;
   std::optional<widestereo::PatchWarp> warp;
+  std::optional<widestereo::Filter> filter;
   std::optional<widestereo::DistanceSampling> sampling;
   std::optional<widestereo::Propagation> propagation;
 

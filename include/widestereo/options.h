@@ -32,6 +32,14 @@ enum class PatchPattern : int {
   checkerboard = 1,  ///< every other one
 };
 
+/// How intensities between pixels are found, always bilinear (values of the kernels,
+/// shaders/patch.glsl).
+enum class Filter : int {
+  exact = 0,   ///< in single precision, the same on every device
+  device = 1,  ///< by the texture units of a GPU, several times as fast; their positions are
+               ///< rounded, to 1/256 pixel on most. On CPUs exact
+};
+
 /// How planes are found.
 enum class SearchMethod : int {
   random = 0,  ///< the paper's: random planes, four neighbours, halved random perturbations
@@ -60,6 +68,7 @@ struct Options {
   /// Weight exp(-|difference| / scale) of a sample whose intensity differs from the centre's, grey
   /// levels of 255; 0 = all weigh the same.
   double weight_scale = 0;
+  Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid.
   int levels = 3;                                 ///< each half the size of the finer one, 1..4

@@ -43,12 +43,9 @@ class CpuBackend final : public Backend {
   explicit CpuBackend(const std::vector<cv::Size>& sizes) : views_(sizes.size()) {
     cv::Size largest;
     for (std::size_t i = 0; i < sizes.size(); ++i) {
-      views_[i].rays.create(sizes[i]);
-      views_[i].intensities.create(sizes[i]);
-      views_[i].hypotheses.create(sizes[i]);
-      views_[i].checks.create(sizes[i]);
-      views_[i].priors.create(sizes[i]);
-      bytes_ += static_cast<std::size_t>(sizes[i].area()) * (4 * sizeof(cv::Vec4f) + sizeof(float));
+      views_[i].set_size(sizes[i]);
+      bytes_ += static_cast<std::size_t>(sizes[i].area()) * 4 * sizeof(cv::Vec4f) +
+                views_[i].intensities.total() * sizeof(float);
       largest = {std::max(largest.width, sizes[i].width),
                  std::max(largest.height, sizes[i].height)};
     }
@@ -59,7 +56,7 @@ class CpuBackend final : public Backend {
 
   void set_rays(int view, const cv::Mat& rays) override { rays.copyTo(views_[view].rays); }
   void set_intensity(int view, const cv::Mat& intensity) override {
-    intensity.copyTo(views_[view].intensities);
+    intensity.copyTo(views_[view].image());
   }
   cv::Mat hypotheses(int view) override { return views_[view].hypotheses.clone(); }
   void set_hypotheses(int view, const cv::Mat& hypotheses) override {

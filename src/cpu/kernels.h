@@ -6,18 +6,24 @@
 #include <atomic>
 #include <opencv2/core/mat.hpp>
 
-#include "kernel/host.h"
-#include "schedule/schedule.h"
+#include "matching/backend.h"
 
 namespace widestereo::kernel::cpu {
 
 /// Memory of one view: row-major, width pixels a row.
 struct ViewMemory {
   cv::Mat_<cv::Vec4f> rays;
-  cv::Mat_<float> intensities;
+  cv::Mat_<float> intensities;  ///< surrounded by APRON masked pixels
   cv::Mat_<cv::Vec4f> hypotheses;
   cv::Mat_<cv::Vec4f> checks;
   cv::Mat_<cv::Vec4f> priors;
+
+  void set_size(cv::Size size) {
+    for (cv::Mat_<cv::Vec4f>* map : {&rays, &hypotheses, &checks, &priors}) map->create(size);
+    intensities = cv::Mat_<float>(with_apron(size), MASKED_INTENSITY);
+  }
+  /// The intensities without the apron.
+  cv::Mat_<float> image() { return intensities(cv::Rect({APRON, APRON}, rays.size())); }
 };
 
 /// What a kernel sees besides its pixel.
@@ -43,15 +49,15 @@ inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return to_vec4(context.views[view].rays(p.y, p.x));
 }
 inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
-  return context.views[view].intensities(p.y, p.x);
+  return context.views[view].intensities(p.y + APRON, p.x + APRON);
 }
 inline vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
-  const float* top = &context.views[view].intensities(p.y, p.x);
-  const float* bottom = &context.views[view].intensities(p.y + 1, p.x);
+  const float* top = &context.views[view].intensities(p.y + APRON, p.x + APRON);
+  const float* bottom = &context.views[view].intensities(p.y + APRON + 1, p.x + APRON);
   return {top[0], top[1], bottom[0], bottom[1]};
 }
 inline void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
-  context.views[view].intensities(p.y, p.x) = intensity;
+  context.views[view].intensities(p.y + APRON, p.x + APRON) = intensity;
 }
 inline void store(cv::Mat_<cv::Vec4f>& map, ivec2 p, vec4 v) {
   map(p.y, p.x) = {v.x, v.y, v.z, v.w};

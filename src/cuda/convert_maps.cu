@@ -48,8 +48,8 @@ __global__ void import_pixel(CudaImage image, ViewMemory view, int height) {
     const float value = read<float>(image, x, y);
     if (value >= 0 && value < above_intensity) intensity = value;
   }
-  const int index = y * view.width + x;
-  view.intensities[index] = view.rays[index].w == 0 ? masked_intensity : intensity;
+  if (view.rays[y * view.width + x].w == 0) intensity = masked_intensity;
+  view.intensities[y * view.stride + x] = intensity;
 }
 
 __global__ void export_pixel(ViewMemory view, CudaViewMaps maps, int height) {

@@ -71,6 +71,7 @@ CudaBackend::CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
   context_.warp = constants.warp;
   context_.pattern = constants.pattern;
   context_.weighted = constants.weighted;
+  context_.filter = constants.filter;
   context_.view_count = constants.view_count;
   // The maps were cleared on the default stream, which the others do not wait for.
   check(cudaDeviceSynchronize(), "clear the maps");
@@ -102,13 +103,18 @@ void CudaBackend::make_maps() {
     const std::string& name = target_.name;
     ViewMaps& maps = maps_.emplace_back();
     maps.rays = DeviceArray<float4>(pixels, name, "the viewing rays");
-    maps.intensities = DeviceArray<float>(pixels, name, "the images");
+    maps.intensities = DeviceImage(size, name);
     maps.hypotheses = DeviceArray<float4>(pixels, name, "the planes");
     maps.checks = DeviceArray<float4>(pixels, name, "the consistency maps");
     maps.priors = DeviceArray<float4>(pixels, name, "the planes' priors");
-    context_.views[maps_.size() - 1] = {maps.rays.get(),       maps.intensities.get(),
-                                        maps.hypotheses.get(), maps.checks.get(),
-                                        maps.priors.get(),     size.width};
+    context_.views[maps_.size() - 1] = {maps.rays.get(),
+                                        maps.intensities.get(),
+                                        maps.intensities.texture(),
+                                        maps.hypotheses.get(),
+                                        maps.checks.get(),
+                                        maps.priors.get(),
+                                        size.width,
+                                        maps.intensities.stride()};
     largest = std::max(largest, pixels);
   }
   transfer_nearest_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
@@ -129,7 +135,7 @@ std::size_t CudaBackend::device_bytes() const {
   return bytes;
 }
 
-void CudaBackend::upload(void* memory, int view, const cv::Mat& map, int type) {
+void CudaBackend::upload(void* memory, int stride, int view, const cv::Mat& map, int type) {
   const cv::Size expected = size(view);
   if (map.size() != expected || map.type() != type) {
     throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) +
@@ -138,10 +144,11 @@ void CudaBackend::upload(void* memory, int view, const cv::Mat& map, int type) {
                 " of " + cv::typeToString(type) + " is needed.");
   }
   const CurrentDevice current = make_current();
+  const std::size_t pitch = static_cast<std::size_t>(stride) * map.elemSize();
   const std::size_t row = static_cast<std::size_t>(map.cols) * map.elemSize();
   check(
-      cudaMemcpy2DAsync(memory, row, map.data, map.step[0], row, static_cast<std::size_t>(map.rows),
-                        cudaMemcpyHostToDevice, stream_.get()),
+      cudaMemcpy2DAsync(memory, pitch, map.data, map.step[0], row,
+                        static_cast<std::size_t>(map.rows), cudaMemcpyHostToDevice, stream_.get()),
       "receive a map");
   check(cudaStreamSynchronize(stream_.get()), "receive a map");
 }
@@ -157,13 +164,16 @@ cv::Mat CudaBackend::download(const void* memory, int view) {
 }
 
 void CudaBackend::set_rays(int view, const cv::Mat& rays) {
-  upload(maps_.at(static_cast<std::size_t>(view)).rays.get(), view, rays, CV_32FC4);
+  upload(maps_.at(static_cast<std::size_t>(view)).rays.get(), size(view).width, view, rays,
+         CV_32FC4);
 }
 void CudaBackend::set_intensity(int view, const cv::Mat& intensity) {
-  upload(maps_.at(static_cast<std::size_t>(view)).intensities.get(), view, intensity, CV_32FC1);
+  const DeviceImage& image = maps_.at(static_cast<std::size_t>(view)).intensities;
+  upload(image.get(), image.stride(), view, intensity, CV_32FC1);
 }
 void CudaBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
-  upload(maps_.at(static_cast<std::size_t>(view)).hypotheses.get(), view, hypotheses, CV_32FC4);
+  upload(maps_.at(static_cast<std::size_t>(view)).hypotheses.get(), size(view).width, view,
+         hypotheses, CV_32FC4);
 }
 cv::Mat CudaBackend::hypotheses(int view) {
   return download(maps_.at(static_cast<std::size_t>(view)).hypotheses.get(), view);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cuda/cuda_target.h"
+#include "cuda/device_image.h"
 #include "cuda/handle.h"
 #include "cuda/kernels.h"
 #include "matching/backend.h"
@@ -48,7 +49,7 @@ class CudaBackend final : public Backend {
  private:
   struct ViewMaps {
     DeviceArray<float4> rays, hypotheses, checks, priors;
-    DeviceArray<float> intensities;
+    DeviceImage intensities;
   };
   /// Consecutive launches between two events.
   struct Stretch {
@@ -67,7 +68,8 @@ class CudaBackend final : public Backend {
   CurrentDevice make_current() const { return CurrentDevice(target_.ordinal, target_.name); }
   void check(cudaError_t result, const char* action) const;
   void make_maps();
-  void upload(void* memory, int view, const cv::Mat& map, int type);
+  /// `stride`: pixels of the memory from row to row.
+  void upload(void* memory, int stride, int view, const cv::Mat& map, int type);
   cv::Mat download(const void* memory, int view);
   void set_parameters(Prepared& prepared, const Schedule& schedule);
   std::vector<Band> bands_of(const Schedule& schedule) const;

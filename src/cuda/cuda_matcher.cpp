@@ -43,6 +43,12 @@ void require_map(const CudaMap<T>& map, std::size_t values, const std::string& w
   require_rows(map.data, map.pitch, sizeof(T), values * sizeof(T), what);
 }
 
+DeviceInfo cuda_device() {
+  DeviceInfo info;
+  info.kind = DeviceKind::cuda;
+  return info;
+}
+
 CudaTarget target_of(int device) {
   int index = device;
   if (device == CudaMatcher::current_device && cudaGetDevice(&index) != cudaSuccess) {
@@ -60,7 +66,7 @@ class CudaMatcher::Implementation {
  public:
   Implementation(const Rig& rig, const Options& options, int device)
       : rig_(rig),
-        setup_(rig, options, DeviceKind::cuda),
+        setup_(rig, options, cuda_device()),
         backend_(target_of(device), setup_.sizes, setup_.schedule.constants) {
     setup_.set_rays(backend_);
     cold_ = backend_.prepare(setup_.schedule);

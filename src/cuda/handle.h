@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "cuda/result.h"
 
@@ -49,6 +50,24 @@ using CudaGraph =
     std::unique_ptr<std::remove_pointer_t<cudaGraph_t>, CudaDestroy<&cudaGraphDestroy>>;
 using CudaGraphExec =
     std::unique_ptr<std::remove_pointer_t<cudaGraphExec_t>, CudaDestroy<&cudaGraphExecDestroy>>;
+
+class CudaTexture {
+ public:
+  CudaTexture() = default;
+  explicit CudaTexture(cudaTextureObject_t object) : object_(object) {}
+  CudaTexture(CudaTexture&& other) noexcept : object_(std::exchange(other.object_, 0)) {}
+  CudaTexture& operator=(CudaTexture&& other) noexcept {
+    std::swap(object_, other.object_);
+    return *this;
+  }
+  ~CudaTexture() {
+    if (object_ != 0) cudaDestroyTextureObject(object_);
+  }
+  cudaTextureObject_t get() const { return object_; }
+
+ private:
+  cudaTextureObject_t object_ = 0;
+};
 
 /// Device memory of a number of T, all zero.
 template <class T>

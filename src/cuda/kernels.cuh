@@ -11,22 +11,25 @@ namespace widestereo::kernel::cuda {
 
 /// Constants known at compile time; -1 = read from the context. Without a model each source's own
 /// is used.
-template <int Radius, int Warp, int Pattern, int Weighted, int Model>
+template <int Radius, int Warp, int Pattern, int Weighted, int Filter, int Model>
 struct Constants {
   static constexpr int window_radius = Radius;
   static constexpr int warp = Warp;
   static constexpr int pattern = Pattern;
   static constexpr int weighted = Weighted;
+  static constexpr int filter = Filter;
   static constexpr int source_model = Model;
 };
-using AnyConstants = Constants<-1, -1, -1, -1, -1>;
+using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 
 #define WINDOW_RADIUS (C::window_radius >= 0 ? C::window_radius : context.window_radius)
 #define WARP (C::warp >= 0 ? C::warp : context.warp)
 #define PATTERN (C::pattern >= 0 ? C::pattern : context.pattern)
 #define WEIGHTED (C::weighted >= 0 ? C::weighted : context.weighted)
+#define FILTER (C::filter >= 0 ? C::filter : context.filter)
 #define SOURCE_MODEL C::source_model
 #define VIEW_COUNT context.view_count
+#define HAS_DEVICE_FILTER
 #undef PARAMETERS
 #define PARAMETERS (*context.parameters)
 #undef FN
@@ -34,10 +37,10 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1>;
 
 /// The algorithm as static functions of a class, which makes its constants template arguments.
 ///
-/// Intensities are read by plain loads through the read-only path: texture gathers need a CUDA
-/// array, which `downsample` could not write like memory. No kernel reads intensities or rays that
-/// it writes, as __ldg() asks; hypotheses, checks and priors are read and written by the same
-/// kernels and are loaded normally.
+/// Textures lie over plain memory, which `downsample` writes like any other; gathering four texels
+/// would need a CUDA array, so that exact filtering takes four loads. No kernel reads intensities
+/// or rays that it writes, as textures and __ldg() ask; hypotheses, checks and priors are read and
+/// written by the same kernels and are loaded normally.
 template <class C>
 struct Algorithm {
   FN int index_of(CONTEXT_ARGUMENT int view, ivec2 p) {
@@ -49,16 +52,23 @@ struct Algorithm {
   FN vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
     return to_vec4(__ldg(context.views[view].rays + index_of(CONTEXT view, p)));
   }
+  FN float* intensity_address(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return context.views[view].intensities + (p.y * context.views[view].stride + p.x);
+  }
   FN float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
-    return __ldg(context.views[view].intensities + index_of(CONTEXT view, p));
+    return __ldg(intensity_address(CONTEXT view, p));
   }
   FN vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
-    const float* top = context.views[view].intensities + index_of(CONTEXT view, p);
-    const float* bottom = top + context.views[view].width;
+    const float* top = intensity_address(CONTEXT view, p);
+    const float* bottom = top + context.views[view].stride;
     return vec4(__ldg(top), __ldg(top + 1), __ldg(bottom), __ldg(bottom + 1));
   }
+  FN float filtered_intensity_at(CONTEXT_ARGUMENT int view, vec2 p) {
+    constexpr float centre = APRON + 0.5f;  // of the texel of pixel (0, 0)
+    return tex2D<float>(context.views[view].texture, p.x + centre, p.y + centre);
+  }
   FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
-    context.views[view].intensities[index_of(CONTEXT view, p)] = intensity;
+    *intensity_address(CONTEXT view, p) = intensity;
   }
   FN vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
     return to_vec4(context.views[view].hypotheses[index_of(CONTEXT view, p)]);
@@ -167,13 +177,14 @@ KernelTable table_of(const KernelEntry (&entries)[count]) {
 /// Calls `get`, a callable over a Constants tag, with those of a source model.
 template <int Radius, int Warp, int Pattern, int Weighted, class Get>
 KernelTable for_model(int source_model, Get get) {
+  constexpr int Filter = FILTER_DEVICE;
   switch (source_model) {
     case CAMERA_KANNALA_BRANDT:
-      return get(Constants<Radius, Warp, Pattern, Weighted, CAMERA_KANNALA_BRANDT>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_KANNALA_BRANDT>());
     case CAMERA_DOUBLE_SPHERE:
-      return get(Constants<Radius, Warp, Pattern, Weighted, CAMERA_DOUBLE_SPHERE>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_DOUBLE_SPHERE>());
     default:
-      return get(Constants<Radius, Warp, Pattern, Weighted, -1>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1>());
   }
 }
 

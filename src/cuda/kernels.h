@@ -2,6 +2,7 @@
 // What the host must know to launch the CUDA kernels.
 #pragma once
 
+#include <texture_types.h>
 #include <vector_types.h>
 
 #include "kernel/host.h"
@@ -15,11 +16,13 @@ constexpr int block_height = 8;
 /// Device memory of one view, row-major, `width` pixels a row.
 struct ViewMemory {
   const float4* rays;
-  float* intensities;
+  float* intensities;           ///< of pixel (0, 0); APRON masked ones surround the image
+  cudaTextureObject_t texture;  ///< over the same memory, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
   float4* checks;
   float4* priors;
   int width;
+  int stride;  ///< of the intensities: pixels from row to row
 };
 
 /// What a kernel sees besides its pixel: the one argument of every kernel.
@@ -30,7 +33,7 @@ struct Context {
   ViewMemory views[MAX_VIEWS];
   uint* transfer_nearest;  ///< of the reference view
   uint* transfer_winner;
-  int window_radius, warp, pattern, weighted;
+  int window_radius, warp, pattern, weighted, filter;
   int view_count;
 };
 static_assert(sizeof(Context) <= 4096);
@@ -51,11 +54,13 @@ inline constexpr int pyramid_window_radius = 4;
 
 /// Every kernel, for any constants.
 KernelTable generic_kernels();
-/// The kernels that take most of the time, compiled for the window and the constants of the
-/// preset `paper` (exact warp, dense), `fast` (affine, checkerboard, weighted) or `quality`
-/// (affine, dense, weighted). `source_model`: a camera model that has kernels of its own
-/// (kannala_brandt, double_sphere), anything else selects those for all models.
+/// The kernels that take most of the time, with filtering by the texture units, compiled for the
+/// window and the constants of a preset: `paper` (exact warp, dense), the same with the affine
+/// warp, `fast` (affine, checkerboard, weighted) or `quality` (affine, dense, weighted).
+/// `source_model`: a camera model that has kernels of its own (kannala_brandt, double_sphere),
+/// anything else selects those for all models.
 KernelTable paper_kernels(int source_model);
+KernelTable affine_paper_kernels(int source_model);
 KernelTable fast_kernels(int source_model);
 KernelTable quality_kernels(int source_model);
 

@@ -19,11 +19,14 @@ const void* find(const KernelTable& table, std::string_view name) {
 
 KernelTable specialised_kernels(const KernelConstants& c) {
   const auto is = [&c](int radius, PatchWarp warp, PatchPattern pattern, bool weighted) {
-    return c.window_radius == radius && c.warp == static_cast<int>(warp) &&
-           c.pattern == static_cast<int>(pattern) && (c.weighted != 0) == weighted;
+    return c.filter == static_cast<int>(Filter::device) && c.window_radius == radius &&
+           c.warp == static_cast<int>(warp) && c.pattern == static_cast<int>(pattern) &&
+           (c.weighted != 0) == weighted;
   };
   if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense, false))
     return paper_kernels(c.source_model);
+  if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, false))
+    return affine_paper_kernels(c.source_model);
   if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
     return fast_kernels(c.source_model);
   if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::dense, true))

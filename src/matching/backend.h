@@ -35,13 +35,18 @@ class ScheduleProgress {
   long long done_ = 0;
 };
 
+/// Size of the memory of an image of intensities (shaders/parameters.glsl).
+inline cv::Size with_apron(cv::Size size) {
+  return {size.width + 2 * APRON, size.height + 2 * APRON};
+}
+
 /// Memory and kernels for matches of fixed sizes on one device. All maps have their view's size.
 class Backend {
  public:
   virtual ~Backend() = default;
   /// Unit rays, CV_32FC4 as from ray_image(); set once.
   virtual void set_rays(int view, const cv::Mat& rays) = 0;
-  /// Intensities in [0, 1], CV_32FC1, negative where masked; before every run.
+  /// Intensities in [0, 1], CV_32FC1, MASKED_INTENSITY where masked; before every run.
   virtual void set_intensity(int view, const cv::Mat& intensity) = 0;
   /// Runs the dispatches in order and waits for them. `progress` may be empty.
   virtual void run(const Schedule& schedule, const Matcher::Progress& progress) = 0;

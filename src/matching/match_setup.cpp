@@ -4,10 +4,20 @@
 #include "widestereo/error.h"
 
 namespace widestereo {
+namespace {
 
-MatchSetup::MatchSetup(const Rig& rig, const Options& options, DeviceKind kind)
-    : schedule(make_schedule(rig, options)), warm_schedule(make_warm_schedule(rig, options)) {
-  if (options.propagation == Propagation::raster && kind != DeviceKind::cpu) {
+/// Devices that are programs have no texture units: exact filtering costs them less.
+Options suited(Options options, const DeviceInfo& device) {
+  if (device.type == "cpu") options.filter = Filter::exact;
+  return options;
+}
+
+}  // namespace
+
+MatchSetup::MatchSetup(const Rig& rig, const Options& options, const DeviceInfo& device)
+    : schedule(make_schedule(rig, suited(options, device))),
+      warm_schedule(make_warm_schedule(rig, suited(options, device))) {
+  if (options.propagation == Propagation::raster && device.kind != DeviceKind::cpu) {
     throw Error(
         "Raster-order propagation is sequential and runs on the CPU only; choose the "
         "device \"cpu\" or checkerboard propagation.");

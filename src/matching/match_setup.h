@@ -11,8 +11,8 @@
 namespace widestereo {
 
 struct MatchSetup {
-  /// Throws Error when rig or options are invalid or do not suit a device of this kind.
-  MatchSetup(const Rig& rig, const Options& options, DeviceKind kind);
+  /// Throws Error when rig or options are invalid or do not suit a device of this kind and type.
+  MatchSetup(const Rig& rig, const Options& options, const DeviceInfo& device);
   void set_rays(Backend& backend) const;
 
   Schedule schedule;       ///< of a frame by itself

@@ -98,7 +98,7 @@ class Matcher::Implementation {
  public:
   Implementation(Device& device, const Rig& rig, const Options& options)
       : rig_(rig),
-        setup_(rig, options, device.info().kind),
+        setup_(rig, options, device.info()),
         backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)) {
     setup_.set_rays(*backend_);
   }

@@ -16,6 +16,7 @@ NLOHMANN_JSON_SERIALIZE_ENUM(DistanceSampling, {{DistanceSampling::uniform, "uni
                                                 {DistanceSampling::inverse, "inverse"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(PatchPattern, {{PatchPattern::dense, "dense"},
                                             {PatchPattern::checkerboard, "checkerboard"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(Filter, {{Filter::exact, "exact"}, {Filter::device, "device"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(SearchMethod,
                              {{SearchMethod::random, "random"}, {SearchMethod::pyramid, "pyramid"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Propagation, {{Propagation::checkerboard, "checkerboard"},
@@ -121,6 +122,7 @@ std::string to_json(const Options& o) {
                                        {"window_radius", o.window_radius},
                                        {"pattern", o.pattern},
                                        {"weight_scale", o.weight_scale},
+                                       {"filter", o.filter},
                                        {"levels", o.levels},
                                        {"sweep_steps", o.sweep_steps},
                                        {"level_iterations", o.level_iterations},

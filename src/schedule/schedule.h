@@ -44,6 +44,7 @@ struct KernelConstants {
   int view_count = 2;  ///< at all levels
   int pattern = 0;
   int weighted = 0;
+  int filter = 0;
   bool operator==(const KernelConstants&) const = default;
 };
 

@@ -12,13 +12,17 @@ namespace {
 constexpr int side_of_source = 21;  // a rotation, a scalar product and a sum
 constexpr int warp_ray_before_projection = 26;
 constexpr int is_ray = 5;  // a squared length, in warp_pixel()
-constexpr int sample_image = 11;
-constexpr int map_offset_affine = 8;
-constexpr int map_offset_quadratic = 23;
+constexpr int map_row_affine = 4;
+constexpr int map_row_quadratic = 13;
+constexpr int map_offset_affine = 4;
+constexpr int map_offset_quadratic = 8;
 constexpr int map_axis = 15;
 constexpr int map_corners = 9;
 constexpr int weight_of_sample = 2;  // a product and an exponential
 constexpr int zncc_cost = 15;        // and the visible share's limit
+
+/// Texture units filter by themselves.
+int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) ? 11 : 0; }
 
 /// Of project(); sources of several models count as pinholes, which take least.
 int projection(int model) {
@@ -135,11 +139,14 @@ PatchOperations patch_operations(const KernelConstants& c) {
   // Two differences from the centre, two sums of weights, five of intensities and their products.
   const int sums = 2 + 2 + 8 + (c.weighted != 0 ? 2 : 0);
   PatchOperations operations;
-  operations.of_sample = weighting + (exact ? warp_ray : map_offset) + sample_image + sums;
-  operations.of_patch = side_of_source + is_ray + warp_ray + sample_image + zncc_cost;
+  operations.of_sample =
+      weighting + (exact ? warp_ray : map_offset) + sample_image(c.filter) + sums;
+  operations.of_patch = side_of_source + is_ray + warp_ray + sample_image(c.filter) + zncc_cost;
   if (!exact) {
     const int anchors = quadratic ? 8 : 4;
-    operations.of_patch += anchors * (is_ray + warp_ray) + 2 * map_axis;
+    const int rows = 2 * c.window_radius + 1;
+    operations.of_patch += anchors * (is_ray + warp_ray) + 2 * map_axis +
+                           rows * (quadratic ? map_row_quadratic : map_row_affine);
   }
   if (quadratic) operations.of_patch += map_corners;
   return operations;

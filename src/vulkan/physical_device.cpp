@@ -50,19 +50,19 @@ std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
   return text;
 }
 
-bool has_format(const InstanceFunctions& vk, VkPhysicalDevice device, VkFormat format,
-                VkFormatFeatureFlags features) {
-  VkFormatProperties properties{};
-  vk.vkGetPhysicalDeviceFormatProperties(device, format, &properties);
-  return (properties.optimalTilingFeatures & features) == features;
-}
-
 std::string too_low(const char* limit, std::uint64_t needed, std::uint64_t offered) {
   return std::string(limit) + " is " + std::to_string(offered) + ", but " + std::to_string(needed) +
          " is needed; use another device.";
 }
 
 }  // namespace
+
+bool has_format(const InstanceFunctions& vk, VkPhysicalDevice device, VkFormat format,
+                VkFormatFeatureFlags features) {
+  VkFormatProperties properties{};
+  vk.vkGetPhysicalDeviceFormatProperties(device, format, &properties);
+  return (properties.optimalTilingFeatures & features) == features;
+}
 
 VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysicalDevice device) {
   VkPhysicalDeviceProperties2 properties{};

@@ -51,9 +51,10 @@ VkDeviceSize largest_area(const std::vector<cv::Size>& sizes) {
   return area;
 }
 
-VkBufferImageCopy whole_layer(int layer, cv::Size size) {
+VkBufferImageCopy whole_layer(int layer, cv::Size size, int apron) {
   VkBufferImageCopy region{};
   region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, static_cast<std::uint32_t>(layer), 1};
+  region.imageOffset = {apron, apron, 0};
   region.imageExtent = {static_cast<std::uint32_t>(size.width),
                         static_cast<std::uint32_t>(size.height), 1};
   return region;
@@ -68,11 +69,23 @@ std::uint32_t workgroups(int threads) {
   return (static_cast<std::uint32_t>(threads) + workgroup - 1) / workgroup;
 }
 
-Handle<VkSampler> make_sampler(const VulkanContext& context) {
+/// The constants that the pipelines are made for: filters that the device lacks become exact.
+KernelConstants possible(KernelConstants constants, const VulkanContext& context, bool sampled) {
+  if (!sampled ||
+      !context.has_format(intensity_format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT)) {
+    constants.filter = static_cast<int>(Filter::exact);
+  }
+  return constants;
+}
+
+/// Gathering takes no notice of the filter.
+Handle<VkSampler> make_sampler(const VulkanContext& context, const KernelConstants& constants) {
+  const VkFilter filter =
+      constants.filter == static_cast<int>(Filter::exact) ? VK_FILTER_NEAREST : VK_FILTER_LINEAR;
   VkSamplerCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO;
-  info.magFilter = VK_FILTER_NEAREST;
-  info.minFilter = VK_FILTER_NEAREST;
+  info.magFilter = filter;
+  info.minFilter = filter;
   info.mipmapMode = VK_SAMPLER_MIPMAP_MODE_NEAREST;
   info.addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
   info.addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
@@ -104,9 +117,10 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
-      pipelines_(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)), cache.get()),
+      sampled_(tuning.sampled.value_or(!runs_on_cpu(context))),
+      pipelines_(context, possible(constants, context, sampled_), sampled_, cache.get()),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
-      sampler_(make_sampler(context)),
+      sampler_(make_sampler(context, possible(constants, context, sampled_))),
       command_pool_(make_command_pool(context)) {
   cache.save();
   make_images(context);
@@ -130,7 +144,7 @@ void VulkanBackend::make_images(const VulkanContext& context) {
                       purpose);
   };
   intensities_ = make_image(
-      context, intensity_format, size, layers,
+      context, intensity_format, with_apron(size), layers,
       VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
       "the images");
   rays_ = make_map(layers, "the viewing rays");
@@ -213,14 +227,16 @@ void VulkanBackend::make_descriptor_set() {
 
 void VulkanBackend::clear_images() {
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkClearColorValue zero{};
+  VkClearColorValue masked{};
+  masked.float32[0] = MASKED_INTENSITY;
   for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
     const VkImageSubresourceRange all =
         layers_of(0, image == &hypotheses_ ? 2 * sizes_.size() : sizes_.size());
     transition(commands, *image, all, VK_IMAGE_LAYOUT_UNDEFINED,
                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+    const VkClearColorValue value = image == &intensities_ ? masked : VkClearColorValue{};
     context_.vk().vkCmdClearColorImage(commands, image->handle.get(),
-                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &zero, 1, &all);
+                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &value, 1, &all);
     transition(commands, *image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
                VK_IMAGE_LAYOUT_GENERAL);
   }
@@ -256,7 +272,8 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stage
                                      nullptr, 0, nullptr);
 }
 
-void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map, int type) {
+void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map, int type,
+                           int apron) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   if (map.size() != size || map.type() != type) {
     throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) +
@@ -267,7 +284,7 @@ void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& m
   map.copyTo(cv::Mat(size, type, staging_.mapped));
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layers_of(view, 1);
-  const VkBufferImageCopy region = whole_layer(view, size);
+  const VkBufferImageCopy region = whole_layer(view, size, apron);
   transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
@@ -280,7 +297,7 @@ cv::Mat VulkanBackend::download(const LayeredImage& image, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layers_of(view, 1);
-  const VkBufferImageCopy region = whole_layer(view, size);
+  const VkBufferImageCopy region = whole_layer(view, size, 0);
   transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
   context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging_.handle.get(),
@@ -292,12 +309,14 @@ cv::Mat VulkanBackend::download(const LayeredImage& image, int view) {
   return cv::Mat(size, CV_32FC4, staging_.mapped).clone();
 }
 
-void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view, rays, CV_32FC4); }
+void VulkanBackend::set_rays(int view, const cv::Mat& rays) {
+  upload(rays_, view, rays, CV_32FC4, 0);
+}
 void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
-  upload(intensities_, view, intensity, CV_32FC1);
+  upload(intensities_, view, intensity, CV_32FC1, APRON);
 }
 void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
-  upload(hypotheses_, view, hypotheses, CV_32FC4);
+  upload(hypotheses_, view, hypotheses, CV_32FC4, 0);
 }
 cv::Mat VulkanBackend::hypotheses(int view) { return download(hypotheses_, view); }
 cv::Mat VulkanBackend::checks(int view) { return download(checks_, view); }

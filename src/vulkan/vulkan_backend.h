@@ -16,11 +16,12 @@
 
 namespace widestereo {
 
-/// What suits a device; the result does not depend on it.
+/// What suits a device; with exact filtering the result does not depend on it.
 struct VulkanTuning {
   /// Longest dispatch and submission in patch samples, 0 = by device type.
   long long max_samples = 0;
-  /// Reads intensities through the texture units; unset: everywhere but on CPUs.
+  /// Reads intensities through the texture units; unset: everywhere but on CPUs. Without, filtering
+  /// is exact.
   std::optional<bool> sampled = std::nullopt;
 };
 
@@ -63,13 +64,15 @@ class VulkanBackend final : public Backend {
   void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
-  void upload(const LayeredImage& image, int view, const cv::Mat& map, int type);
+  /// `apron`: where the map begins in the image, both ways.
+  void upload(const LayeredImage& image, int view, const cv::Mat& map, int type, int apron);
   cv::Mat download(const LayeredImage& image, int view);
 
   const VulkanContext& context_;
   std::vector<cv::Size> sizes_;
   KernelConstants constants_;
   long long max_samples_;
+  bool sampled_;
   Pipelines pipelines_;
   LayeredImage intensities_;
   LayeredImage rays_;

@@ -52,7 +52,7 @@ inline std::vector<cv::Size> sizes_of(const Rig& rig) {
 inline void upload(Backend& backend, KernelFixture& match) {
   for (int i = 0; i < static_cast<int>(match.rig().views.size()); ++i) {
     backend.set_rays(i, match.view(i).rays);
-    backend.set_intensity(i, match.view(i).intensities);
+    backend.set_intensity(i, match.view(i).image());
   }
 }
 

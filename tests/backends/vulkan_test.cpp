@@ -142,6 +142,7 @@ TEST(VulkanMatch, TexturesAndStorageImagesGiveTheSameBits) {
   REQUIRE_VULKAN_OR_SKIP();
   Application application;
   KernelFixture match = small_match();
+  match.schedule().constants.filter = static_cast<int>(Filter::exact);
   std::vector<cv::Mat> results;
   for (const bool sampled : {false, true}) {
     VulkanBackend backend(application.context, sizes_of(match.rig()), match.schedule().constants,
@@ -149,6 +150,28 @@ TEST(VulkanMatch, TexturesAndStorageImagesGiveTheSameBits) {
     results.push_back(run(backend, match));
   }
   EXPECT_TRUE(same_bits(results[0], results[1]));
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, TextureUnitsFilterAsWellAsTheirPositions) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  KernelFixture match = small_match();
+  match.schedule().dispatches.resize(1);  // random planes: no choice amplifies rounding
+  std::vector<cv::Mat> results;
+  for (const Filter filter : {Filter::exact, Filter::device}) {
+    match.schedule().constants.filter = static_cast<int>(filter);
+    VulkanBackend backend(application.context, sizes_of(match.rig()), match.schedule().constants,
+                          application.cache, {.sampled = true});
+    results.push_back(run(backend, match));
+  }
+  cv::Mat difference;
+  cv::absdiff(results[0], results[1], difference);
+  double largest = 0;
+  cv::minMaxLoc(difference, nullptr, &largest);
+  EXPECT_GT(largest, 0) << "the texture units were not used";
+  // Planes have the same bits; costs differ as positions do, and by all where visibility flips.
+  EXPECT_LT(cv::countNonZero(difference > 0.02), 4);
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 

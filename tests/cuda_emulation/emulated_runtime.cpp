@@ -239,6 +239,44 @@ cudaError_t cudaMemcpy2D(void* to, std::size_t to_pitch, const void* from, std::
   return error;
 }
 
+cudaError_t cudaMemcpy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {
+  return cudaMemcpy2D(to, bytes, from, bytes, bytes, 1, kind);
+}
+
+cudaChannelFormatDesc cudaCreateChannelDesc(int x, int y, int z, int w,
+                                            cudaChannelFormatKind kind) {
+  return {x, y, z, w, kind};
+}
+cudaError_t cudaCreateTextureObject(cudaTextureObject_t* texture, const cudaResourceDesc* resource,
+                                    const cudaTextureDesc* how, const cudaResourceViewDesc*) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  constexpr std::size_t pitch_alignment = 32;
+  const auto& memory = resource->res.pitch2D;
+  const bool is_float = memory.desc.x == 32 && memory.desc.y == 0 && memory.desc.z == 0 &&
+                        memory.desc.w == 0 && memory.desc.f == cudaChannelFormatKindFloat;
+  const bool emulated = resource->resType == cudaResourceTypePitch2D && is_float &&
+                        how->filterMode == cudaFilterModeLinear && how->normalizedCoords == 0 &&
+                        how->addressMode[0] == cudaAddressModeClamp &&
+                        how->addressMode[1] == cudaAddressModeClamp;
+  const auto allocation = allocations().find(memory.devPtr);
+  const bool fits = allocation != allocations().end() &&
+                    memory.pitchInBytes % pitch_alignment == 0 &&
+                    memory.width * sizeof(float) <= memory.pitchInBytes &&
+                    memory.pitchInBytes * memory.height <= allocation->second;
+  if (!emulated || !fits) return cudaErrorInvalidValue;
+  *texture = reinterpret_cast<cudaTextureObject_t>(new EmulatedTexture{
+      static_cast<const float*>(memory.devPtr), static_cast<int>(memory.width),
+      static_cast<int>(memory.height), static_cast<int>(memory.pitchInBytes / sizeof(float))});
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaDestroyTextureObject(cudaTextureObject_t texture) {
+  run_everything();  // the queues may read it
+  delete reinterpret_cast<EmulatedTexture*>(texture);
+  --emulation().live_objects;
+  return cudaSuccess;
+}
+
 cudaError_t cudaStreamCreate(cudaStream_t* stream) { return cudaStreamCreateWithFlags(stream, 0); }
 cudaError_t cudaStreamCreateWithFlags(cudaStream_t* stream, unsigned flags) {
   if (const cudaError_t error = step_outside_capture()) return error;

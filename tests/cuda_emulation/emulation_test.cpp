@@ -197,7 +197,7 @@ TEST_F(CudaEmulation, DevicesAreFoundByIndexNameAndUuid) {
 TEST_F(CudaEmulation, DevicesStateTheirPeaks) {
   const DevicePeaks h200 = Device::open("cuda").info().peaks;
   EXPECT_NEAR(h200.gflops, 66908, 1);  // as NVIDIA's data sheet: 67 TFLOP/s
-  EXPECT_NEAR(h200.gtexels, 8363, 1);
+  EXPECT_NEAR(h200.gtexels, 4182, 1);
   EXPECT_NEAR(h200.gbps, 4917, 1);  // ... 4.8 TB/s
   emulation().major = 99;
   EXPECT_EQ(list_cuda_devices(nullptr)[0].peaks.gflops, 0) << "lanes unknown";

@@ -39,6 +39,7 @@ inline auto operator<=>(Number a, Number b) { return a.value <=> b.value; }
 inline bool operator==(Number a, Number b) { return a.value == b.value; }
 inline Number sqrt(Number a) { return counted(std::sqrt(a.value)); }
 inline Number exp(Number a) { return counted(std::exp(a.value)); }
+inline Number exp2(Number a) { return counted(std::exp2(a.value)); }
 inline Number atan(Number y, Number x) { return counted(std::atan2(y.value, x.value)); }
 inline Number abs(Number a) { return std::fabs(a.value); }
 inline Number floor(Number a) { return std::floor(a.value); }

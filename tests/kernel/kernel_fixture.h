@@ -57,14 +57,16 @@ class KernelFixture {
     for (std::size_t i = 0; i < views_.size(); ++i) {
       const View& view = rig_.views[i];
       const cv::Size size(view.camera.width, view.camera.height);
+      views_[i].set_size(size);
       views_[i].rays = ray_image(view.camera, view.mask);
-      views_[i].intensities = smooth_noise(size, static_cast<int>(i) + 1);
+      cv::Mat image = smooth_noise(size, static_cast<int>(i) + 1);
       cv::Mat usable;
       cv::extractChannel(views_[i].rays, usable, 3);
-      views_[i].intensities.setTo(-1, usable == 0);
-      views_[i].hypotheses = cv::Mat::zeros(size, CV_32FC4);
-      views_[i].checks = cv::Mat::zeros(size, CV_32FC4);
-      views_[i].priors = cv::Mat::zeros(size, CV_32FC4);
+      image.setTo(MASKED_INTENSITY, usable == 0);
+      image.copyTo(views_[i].image());
+      for (auto* map : {&views_[i].hypotheses, &views_[i].checks, &views_[i].priors}) {
+        map->setTo(cv::Scalar::all(0));
+      }
       largest = {std::max(largest.width, size.width), std::max(largest.height, size.height)};
     }
     nearest_.create(largest);

@@ -36,8 +36,8 @@ double literal_cost(KernelFixture& fixture, int reference, int source, ivec2 pix
                     const Eigen::Vector3d& m, int radius, double min_visible) {
   const Rig& rig = fixture.rig();
   const Eigen::Isometry3d motion = source_from_reference(rig.views[source], rig.views[reference]);
-  const cv::Mat_<float>& a_image = fixture.view(reference).intensities;
-  const cv::Mat_<float>& b_image = fixture.view(source).intensities;
+  const cv::Mat_<float> a_image = fixture.view(reference).image();
+  const cv::Mat_<float> b_image = fixture.view(source).image();
   if (m.dot(motion.inverse().translation()) >= 1) return 2;
   std::vector<double> a_values;
   std::vector<double> b_values;
@@ -176,14 +176,14 @@ TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
       double sum = 0;
       int n = 0;
       for (int dy = -5; dy <= 5; ++dy) {
+        const kernel::cpu::RowMap row = kernel::cpu::map_row(context, map, static_cast<float>(dy));
         for (int dx = -5; dx <= 5; ++dx) {
           kernel::vec2 exact{};
           if (!kernel::cpu::warp_pixel(context, pair, camera, camera.size.z, mk,
                                        ivec2(pixel.x + dx, pixel.y + dy), exact)) {
             continue;
           }
-          const kernel::vec2 mapped = kernel::cpu::map_offset(
-              map, static_cast<int>(warp), static_cast<float>(dx), static_cast<float>(dy));
+          const kernel::vec2 mapped = kernel::cpu::map_offset(context, row, static_cast<float>(dx));
           const kernel::vec2 e = mapped - exact;
           sum += static_cast<double>(dot(e, e));
           ++n;
@@ -201,7 +201,7 @@ TEST(PatchCostRules, TexturelessPatchCarriesNoInformation) {
   Options options;
   options.window_radius = 3;
   KernelFixture fixture(fisheye_rig(64), options);
-  fixture.view(0).intensities.setTo(0.5);
+  fixture.view(0).image().setTo(0.5);
   const cv::Vec4f ray = fixture.view(0).rays(32, 32);
   const vec3 m(ray[0] / 2, ray[1] / 2, ray[2] / 2);
   EXPECT_EQ(kernel::cpu::patch_cost(fixture.context(), ivec2(32, 32), m), NO_INFORMATION_COST);

@@ -323,7 +323,7 @@ TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
   AgreeingViews views(options);
   KernelFixture& fixture = views.fixture;
   fixture.view(0).priors = cv::Mat::zeros(96, 96, CV_32FC4);
-  fixture.view(0).intensities.setTo(0.5);
+  fixture.view(0).image().setTo(0.5);
   const vec3 m = views.plane(0);
   // A nearer object on the left, the surface behind it on the right, and rejected pixels between.
   fixture.view(0).hypotheses.colRange(0, 44).setTo(cv::Scalar(3 * m.x, 3 * m.y, 3 * m.z, 0.1));
@@ -368,7 +368,7 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
                                                        static_cast<float>(1 / distance) * ray, 0);
     return static_cast<double>(1 / (better.x * ray.x + better.y * ray.y + better.z * ray.z));
   };
-  for (int view = 0; view < 2; ++view) fixture.view(view).intensities.setTo(0.5);
+  for (int view = 0; view < 2; ++view) fixture.view(view).image().setTo(0.5);
   EXPECT_NEAR(chosen_distance(2, NO_INFORMATION_COST, 90), 90, 0.01) << "nothing to see: far";
   EXPECT_NEAR(chosen_distance(90, NO_INFORMATION_COST, 2), 90, 0.01);
   EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4) << "a difference in cost outweighs it";

@@ -22,6 +22,37 @@ T __ldg(const T* address) {
   return *address;
 }
 
+/// What a texture object is a handle of.
+struct EmulatedTexture {
+  const float* texels;
+  int width, height, stride;
+};
+
+// As the programming guide defines linear filtering, with weights of eight bits.
+template <class T>
+T tex2D(cudaTextureObject_t object, float x, float y) {
+  const auto& texture = *reinterpret_cast<const EmulatedTexture*>(object);
+  const auto split = [](float position, int size, int* texel) {
+    const float limited = fminf(fmaxf(position - 0.5f, -1.0f), static_cast<float>(size));
+    const float whole = floorf(limited);
+    *texel = static_cast<int>(whole);
+    return rintf((limited - whole) * 256) / 256;
+  };
+  int column = 0;
+  int row = 0;
+  const float fx = split(x, texture.width, &column);
+  const float fy = split(y, texture.height, &row);
+  const auto texel = [&](int dx, int dy) {
+    const int i = column + dx < 0               ? 0
+                  : column + dx < texture.width ? column + dx
+                                                : texture.width - 1;
+    const int j = row + dy < 0 ? 0 : row + dy < texture.height ? row + dy : texture.height - 1;
+    return texture.texels[j * texture.stride + i];
+  };
+  return (1 - fx) * (1 - fy) * texel(0, 0) + fx * (1 - fy) * texel(1, 0) +
+         (1 - fx) * fy * texel(0, 1) + fx * fy * texel(1, 1);
+}
+
 // As the hardware, by a power of two; glibc has a function of the same name.
 #define __expf(a) ::exp2f(1.442695041f * (a))
 
