@@ -46,9 +46,9 @@ vec4 intensity_taps(int view, ivec2 p) {
               intensity_at(view, p + ivec2(0, 1)), intensity_at(view, p + ivec2(1, 1)));
 }
 
-float filtered_intensity_at(int view, vec2 p) {
-  vec2 texel = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
-  return textureLod(intensity_texture, vec3((p + (float(APRON) + 0.5f)) * texel, float(view)), 0.0f).x;
+float filtered_intensity_at(int view, vec2 texel) {
+  vec2 size = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
+  return textureLod(intensity_texture, vec3(texel * size, float(view)), 0.0f).x;
 }
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }

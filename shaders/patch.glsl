@@ -16,15 +16,21 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
+// Where a position lies in what sample_image() reads.
+FN vec2 texel_at(vec2 position, int filter_kind) {
+  if (filter_kind == FILTER_EXACT) return position;
+  return position + vec2(float(APRON) + 0.5f, float(APRON) + 0.5f);
+}
+
 // Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others, and every image
 // is surrounded by masked ones. The weights are exact, or those of the texture units (1/256 on most GPUs).
-FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 position) {
+FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
 #ifdef HAS_DEVICE_FILTER
-  if (FILTER == FILTER_DEVICE) return filtered_intensity_at(CONTEXT view, position);
+  if (FILTER == FILTER_DEVICE) return filtered_intensity_at(CONTEXT view, texel);
 #endif
   // The limit comes first: then it also replaces what is no number.
-  float x = min(float(size.x), max(-1.0f, position.x));
-  float y = min(float(size.y), max(-1.0f, position.y));
+  float x = min(float(size.x), max(-1.0f, texel.x));
+  float y = min(float(size.y), max(-1.0f, texel.y));
   float left = floor(x);
   float top = floor(y);
   vec4 taps = intensity_taps(CONTEXT view, ivec2(int(left), int(top)));
@@ -137,21 +143,21 @@ FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int m
   return has_x && has_y;
 }
 
-// The part of the map for one row of the patch: start + x (slope + x bend).
+// The part of the map for one row of the patch, from its first column x on: start + dx (slope + dx bend).
 struct RowMap {
   vec2 start;
   vec2 slope;
   vec2 bend;
 };
 
-FN RowMap map_row(CONTEXT_ARGUMENT PatchMap map, float y) {
+FN RowMap map_row(CONTEXT_ARGUMENT PatchMap map, float x, float y) {
   RowMap row;
-  row.start = map.u0 + y * map.uy;
+  row.start = map.u0 + x * map.ux + y * map.uy;
   row.slope = map.ux;
   row.bend = map.uxx;
   if (WARP == WARP_QUADRATIC) {
-    row.start = row.start + (y * y) * map.uyy;
-    row.slope = row.slope + y * map.uxy;
+    row.start = row.start + (x * x) * map.uxx + (x * y) * map.uxy + (y * y) * map.uyy;
+    row.slope = row.slope + (2.0f * x) * map.uxx + y * map.uxy;
   }
   return row;
 }
@@ -182,9 +188,9 @@ FN int first_column(CONTEXT_ARGUMENT int row) {
 }
 
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
-// which loops read once.
+// which loops read once. Zero for masked samples; others differ by 1 at most.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
-  if (WEIGHTED == 0) return 1.0f;
+  if (WEIGHTED == 0) return difference > -2.0f ? 1.0f : 0.0f;
   return exp2(-abs(difference) * inverse_scale);
 }
 
@@ -199,13 +205,14 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   // Sums are taken relative to the centre's intensities: single precision then suffices.
   vec2 centre;
   if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return INVALID_COST;
-  float centre_b = sample_image(CONTEXT source, camera.size, centre);
+  float centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
   float centre_a = intensity_at(CONTEXT reference, pixel);
   if (!(min(centre_a, centre_b) >= 0.0f)) return INVALID_COST;
 
   PatchMap map;
   if (WARP != WARP_EXACT) {
     if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, map)) return INVALID_COST;
+    map.u0 = texel_at(map.u0, FILTER);
   }
 
   float inverse_scale = PARAMETERS.support.x;
@@ -216,29 +223,28 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_aa = 0.0f;
   float sum_bb = 0.0f;
   float sum_ab = 0.0f;
-  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+  UNROLL_ROWS for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    int first = first_column(CONTEXT dy);
     RowMap row;
-    if (WARP != WARP_EXACT) row = map_row(CONTEXT map, float(dy));
-    UNROLL for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
-      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      float a = intensity_at(CONTEXT reference, q);
-      bool seen = a >= 0.0f;
-      a -= centre_a;
-      float weight = seen ? sample_weight(CONTEXT a, inverse_scale) : 0.0f;
+    if (WARP != WARP_EXACT) row = map_row(CONTEXT map, float(first), float(dy));
+    UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
+      ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
+      float a = intensity_at(CONTEXT reference, q) - centre_a;
+      // Samples that are not seen weigh nothing: no branches, as most are seen.
+      float weight = sample_weight(CONTEXT a, inverse_scale);
       of_patch += weight;
-      vec2 position;
+      vec2 texel;
       if (WARP == WARP_EXACT) {
-        if (!seen) continue;
+        if (weight == 0.0f) continue;
         vec4 ray = ray_at(CONTEXT reference, q);
-        if (!warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position)) continue;
+        if (!warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), texel)) continue;
+        texel = texel_at(texel, FILTER);
       } else {
-        position = map_offset(CONTEXT row, float(dx));
+        texel = map_offset(CONTEXT row, float(dx));
       }
-      float b = sample_image(CONTEXT source, camera.size, position);
-      // Without branches: most samples are seen.
-      seen = b >= 0.0f;
-      weight = seen ? weight : 0.0f;
-      b = seen ? b - centre_b : 0.0f;
+      float b = sample_image(CONTEXT source, camera.size, texel);
+      weight = b >= 0.0f ? weight : 0.0f;
+      b -= centre_b;
       float weighted_a = weight * a;
       float weighted_b = weight * b;
       n += weight;

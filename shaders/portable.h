@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// Lets glslang, nvcc and g++ compile the same kernel source. Rules of the subset: float literals
-// with f, no swizzles, no array parameters, float(i) casts, OUT(T) instead of out, everything an
-// accessor or a launch needs passed behind CONTEXT (nothing in GLSL, a reference in C++ and CUDA).
+// Lets glslang, nvcc and g++ compile the same kernel source. Rules of the subset: float literals with
+// f, no swizzles, no array parameters, float(i) casts, OUT(T) instead of out, everything an accessor
+// or a launch needs passed behind CONTEXT (nothing in GLSL, a reference in C++ and CUDA).
 //
 // A back end provides, before including the algorithm:
 //   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
-//   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON
-//   pixels outside vec4  intensity_taps(view, pixel)       of pixel, its right, lower and lower
-//   right neighbour float filtered_intensity_at(view, position)  bilinear, of the texture units
-//   (with HAS_DEVICE_FILTER) vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel,
-//   vec4) vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of
-//   parameters.glsl.
+//   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON pixels outside
+//   vec4  intensity_taps(view, pixel)       of pixel, its right, lower and lower right neighbour
+//   float filtered_intensity_at(view, texel) bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
+//                                           its centre at APRON + 0.5; only with HAS_DEVICE_FILTER
+//   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
+//   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl.
 #ifndef WIDESTEREO_PORTABLE_H
 #define WIDESTEREO_PORTABLE_H
 
@@ -19,15 +19,17 @@
 #ifdef __CUDACC__
 #define FN __host__ __device__ inline
 #define UNROLL _Pragma("unroll")
+#define UNROLL_ROWS _Pragma("unroll C::unrolled_rows")
 #else
 #define FN inline
 #define UNROLL
+#define UNROLL_ROWS
 #endif
 #define OUT(T) T&
 #define CONTEXT context,
 #define CONTEXT_ONLY context
 #define CONTEXT_ARGUMENT const Context &context,
-#define CONTEXT_ARGUMENT_ONLY const Context& context
+#define CONTEXT_ARGUMENT_ONLY const Context &context
 #define PARAMETERS context.parameters
 #define PASS context.pass
 
@@ -38,6 +40,7 @@
 
 #define FN
 #define UNROLL
+#define UNROLL_ROWS
 #define OUT(T) out T
 #define CONTEXT
 #define CONTEXT_ONLY

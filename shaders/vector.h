@@ -31,38 +31,22 @@ using uint = unsigned int;
 using uvec4 = Vector4<uint>;
 
 template <class T>
-FN Vector2<T> operator+(Vector2<T> a, Vector2<T> b) {
-  return {a.x + b.x, a.y + b.y};
-}
+FN Vector2<T> operator+(Vector2<T> a, Vector2<T> b) { return {a.x + b.x, a.y + b.y}; }
 template <class T>
-FN Vector2<T> operator-(Vector2<T> a, Vector2<T> b) {
-  return {a.x - b.x, a.y - b.y};
-}
+FN Vector2<T> operator-(Vector2<T> a, Vector2<T> b) { return {a.x - b.x, a.y - b.y}; }
 template <class T>
-FN Vector2<T> operator*(T s, Vector2<T> a) {
-  return {s * a.x, s * a.y};
-}
+FN Vector2<T> operator*(T s, Vector2<T> a) { return {s * a.x, s * a.y}; }
 template <class T>
-FN T dot(Vector2<T> a, Vector2<T> b) {
-  return a.x * b.x + a.y * b.y;
-}
+FN T dot(Vector2<T> a, Vector2<T> b) { return a.x * b.x + a.y * b.y; }
 
 template <class T>
-FN Vector3<T> operator+(Vector3<T> a, Vector3<T> b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
+FN Vector3<T> operator+(Vector3<T> a, Vector3<T> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 template <class T>
-FN Vector3<T> operator-(Vector3<T> a, Vector3<T> b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
+FN Vector3<T> operator-(Vector3<T> a, Vector3<T> b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 template <class T>
-FN Vector3<T> operator*(T s, Vector3<T> a) {
-  return {s * a.x, s * a.y, s * a.z};
-}
+FN Vector3<T> operator*(T s, Vector3<T> a) { return {s * a.x, s * a.y, s * a.z}; }
 template <class T>
-FN T dot(Vector3<T> a, Vector3<T> b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+FN T dot(Vector3<T> a, Vector3<T> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 template <class T>
 FN Vector3<T> cross(Vector3<T> a, Vector3<T> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
@@ -90,25 +74,15 @@ FN float abs(float a) { return ::fabsf(a); }
 FN double abs(double a) { return ::fabs(a); }
 FN int abs(int a) { return a < 0 ? -a : a; }
 template <class T>
-FN T min(T a, T b) {
-  return b < a ? b : a;
-}
+FN T min(T a, T b) { return b < a ? b : a; }
 template <class T>
-FN T max(T a, T b) {
-  return a < b ? b : a;
-}
+FN T max(T a, T b) { return a < b ? b : a; }
 template <class T>
-FN T clamp(T a, T low, T high) {
-  return min(max(a, low), high);
-}
+FN T clamp(T a, T low, T high) { return min(max(a, low), high); }
 template <class T>
-FN T length(Vector3<T> a) {
-  return sqrt(dot(a, a));
-}
+FN T length(Vector3<T> a) { return sqrt(dot(a, a)); }
 template <class T>
-FN T length(Vector2<T> a) {
-  return sqrt(dot(a, a));
-}
+FN T length(Vector2<T> a) { return sqrt(dot(a, a)); }
 FN float uint_as_float(uint a) {
   float f;
   memcpy(&f, &a, sizeof f);

@@ -42,6 +42,7 @@ struct Context {
 #define VIEW_COUNT context.constants.view_count
 #define PATTERN context.constants.pattern
 #define WEIGHTED context.constants.weighted
+#define FILTER FILTER_EXACT
 
 inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 

@@ -6,6 +6,7 @@
 #include <cuda_runtime.h>
 
 #include "cuda/kernels.h"
+#include "widestereo/options.h"
 
 namespace widestereo::kernel::cuda {
 
@@ -19,6 +20,8 @@ struct Constants {
   static constexpr int weighted = Weighted;
   static constexpr int filter = Filter;
   static constexpr int source_model = Model;
+  /// On the checkerboard rows start in turn one column later: two are the same for all turns.
+  static constexpr int unrolled_rows = Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
 };
 using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 
@@ -63,9 +66,8 @@ struct Algorithm {
     const float* bottom = top + context.views[view].stride;
     return vec4(__ldg(top), __ldg(top + 1), __ldg(bottom), __ldg(bottom + 1));
   }
-  FN float filtered_intensity_at(CONTEXT_ARGUMENT int view, vec2 p) {
-    constexpr float centre = APRON + 0.5f;  // of the texel of pixel (0, 0)
-    return tex2D<float>(context.views[view].texture, p.x + centre, p.y + centre);
+  FN float filtered_intensity_at(CONTEXT_ARGUMENT int view, vec2 texel) {
+    return tex2D<float>(context.views[view].texture, texel.x, texel.y);
   }
   FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
     *intensity_address(CONTEXT view, p) = intensity;

@@ -12,8 +12,8 @@ namespace {
 constexpr int side_of_source = 21;  // a rotation, a scalar product and a sum
 constexpr int warp_ray_before_projection = 26;
 constexpr int is_ray = 5;  // a squared length, in warp_pixel()
-constexpr int map_row_affine = 4;
-constexpr int map_row_quadratic = 13;
+constexpr int map_row_affine = 8;
+constexpr int map_row_quadratic = 32;
 constexpr int map_offset_affine = 4;
 constexpr int map_offset_quadratic = 8;
 constexpr int map_axis = 15;
