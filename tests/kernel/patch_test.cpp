@@ -176,14 +176,16 @@ TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
       double sum = 0;
       int n = 0;
       for (int dy = -5; dy <= 5; ++dy) {
-        const kernel::cpu::RowMap row = kernel::cpu::map_row(context, map, -5, static_cast<float>(dy));
+        const kernel::cpu::RowMap row =
+            kernel::cpu::map_row(context, map, -5, static_cast<float>(dy));
         for (int dx = -5; dx <= 5; ++dx) {
           kernel::vec2 exact{};
           if (!kernel::cpu::warp_pixel(context, pair, camera, camera.size.z, mk,
                                        ivec2(pixel.x + dx, pixel.y + dy), exact)) {
             continue;
           }
-          const kernel::vec2 mapped = kernel::cpu::map_offset(context, row, static_cast<float>(dx + 5));
+          const kernel::vec2 mapped =
+              kernel::cpu::map_offset(context, row, static_cast<float>(dx + 5));
           const kernel::vec2 e = mapped - exact;
           sum += static_cast<double>(dot(e, e));
           ++n;
