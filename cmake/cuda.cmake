@@ -52,9 +52,9 @@ target_link_libraries(widestereo_cuda PUBLIC widestereo_settings)
 list(APPEND component_targets widestereo_cuda)
 
 if(WIDESTEREO_HAS_CUDA)
-  # C++17, which CUDA 11 knows. Kernels may contract to fused multiply-add and divide as Vulkan drivers do, to 2 units in
-  # the last place: back ends agree to tolerances, and it saves instructions. The maps' conversions must equal the
-  # host's.
+  # C++17, which CUDA 11 knows. Kernels for the presets' constants may contract to fused multiply-add and divide as
+  # Vulkan drivers do, to 2 units in the last place, which saves instructions. The generic kernels, which exact
+  # filtering runs, and the maps' conversions must give the host's bits.
   set_target_properties(widestereo_cuda PROPERTIES CUDA_STANDARD 17 CUDA_STANDARD_REQUIRED ON
                         CUDA_RUNTIME_LIBRARY Static)
   target_compile_options(widestereo_cuda PRIVATE
@@ -65,7 +65,8 @@ if(WIDESTEREO_HAS_CUDA)
   endif()
   set_source_files_properties(${kernel_sources} PROPERTIES
                               COMPILE_OPTIONS "-ftz=true;-prec-div=false;-prec-sqrt=false")
-  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/convert_maps.cu PROPERTIES COMPILE_OPTIONS -fmad=false)
+  set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/convert_maps.cu
+                              ${PROJECT_SOURCE_DIR}/src/cuda/kernels_generic.cu PROPERTIES COMPILE_OPTIONS -fmad=false)
   set_source_files_properties(${PROJECT_SOURCE_DIR}/src/cuda/architectures.cpp PROPERTIES COMPILE_DEFINITIONS
                               "WIDESTEREO_CUDA_ARCHITECTURES=\"${architectures}\"")
   target_compile_definitions(widestereo_cuda PUBLIC WIDESTEREO_HAS_CUDA)

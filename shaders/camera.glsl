@@ -45,7 +45,7 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
   real y = real(0);
   if (model == CAMERA_KANNALA_BRANDT) {
     real rho = sqrt(rho2);
-    real theta = atan(rho, point.z);
+    real theta = arc_tangent(rho, point.z);
     real t2 = theta * theta;
     real distorted =
         theta *
@@ -58,7 +58,7 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     y = point.y * scale;
   } else if (model == CAMERA_FIELD_OF_VIEW) {
     real rho = sqrt(rho2);
-    real distorted = atan(rho * camera.shape.y, point.z) / camera.shape.x;
+    real distorted = arc_tangent(rho * camera.shape.y, point.z) / camera.shape.x;
     inside = inside && (rho > real(0) || point.z > real(0));
     real scale = rho > real(0) ? distorted / rho : camera.shape.y / (camera.shape.x * point.z);
     x = point.x * scale;

@@ -101,9 +101,9 @@ FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float sp
 // displacement from the source's own plane (px), the support of the surroundings and the variance of intensity
 // that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md).
 FN float confidence_of(float displacement, float support, float unexplained) {
-  float log_odds = 1.41f - 0.48f * log(1.0f + 4.0f * displacement) + 1.44f * log(support + 0.02f) -
-                   0.31f * log(unexplained + 1.5e-5f);
-  return 1.0f / (1.0f + exp(-log_odds));
+  float log_odds = 1.41f - 0.48f * logarithm(1.0f + 4.0f * displacement) + 1.44f * logarithm(support + 0.02f) -
+                   0.31f * logarithm(unexplained + 1.5e-5f);
+  return 1.0f / (1.0f + exponential(-log_odds));
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {

@@ -31,9 +31,8 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
       vec3 m = vec3(held.x, held.y, held.z);
       if (!admissible(CONTEXT ray, m)) break;
-      // A floor decides among neighbours that are all unlike the pixel.
       float unlike = abs(intensity_at(CONTEXT PASS.reference, q) - intensity);
-      float weight = exp(-unlike * PARAMETERS.support.y) + 1e-12f;
+      float weight = 1.0f / growth(unlike * PARAMETERS.support.y);
       int place = count;
       while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
         planes[place] = planes[place - 1];

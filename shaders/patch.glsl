@@ -191,7 +191,7 @@ FN int first_column(CONTEXT_ARGUMENT int row) {
 // which loops read once. Zero for masked samples; others differ by 1 at most.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
   if (WEIGHTED == 0) return difference > -2.0f ? 1.0f : 0.0f;
-  return exp2(-abs(difference) * inverse_scale);
+  return 1.0f / growth(abs(difference) * inverse_scale);
 }
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.

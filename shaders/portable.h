@@ -55,6 +55,8 @@
 #define uint_as_float(a) uintBitsToFloat(a)
 #define float_as_uint(a) floatBitsToUint(a)
 
+#include "elementary.glsl"
+
 #endif
 
 #endif

@@ -19,7 +19,7 @@
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
-#define TANGENT_SCALE 100.0f
+#define TANGENT_SCALE 128.0f
 
 // Direction in the reference image, per pixel of displacement along `along` (unit) in the source: the inverse of
 // the map's derivative at the pixel; `along` itself where the derivative cannot be measured.
@@ -87,7 +87,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     // The checkerboard leaves out every other pixel, whose information is about the same.
     information *= float(COLUMN_STEP) * correlation * correlation;
     float spread = n > 0.0f ? max(sum_squares / n - sum * sum / (n * n), 0.0f) : 0.0f;
-    float residual = spread * (1.0f - correlation * correlation) + 1e-7f;
+    float residual = spread * held.w * (2.0f - held.w) + 1e-7f;
     if (speed > 0.0f && information > 0.0f) {
       vec2 difference = difference_from_source(CONTEXT source, pixel, ray, m);
       float displacement = difference.y < UNKNOWN_DIFFERENCE ? min(difference.y, LARGEST_DISPLACEMENT)
@@ -149,9 +149,9 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own.
       float scale2 = 2.0f * min(measure.x + own_variance, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
       float doubt = 1.0f + residual * residual / scale2;
-      float weight = exp(-float(dx * dx + dy * dy) * fall_off -
-                         abs(a - centre) * PARAMETERS.support.y) *
-                     measure.y * measure.y / (measure.x * doubt * doubt);
+      float weight = measure.y * measure.y /
+                     (measure.x * doubt * doubt * growth(float(dx * dx + dy * dy) * fall_off) *
+                      growth(abs(a - centre) * PARAMETERS.support.y));
       s += weight;
       sx += weight * x;
       sy += weight * y;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // PatchMatch over plane hypotheses: random initialisation, propagation and random refinement of one pixel.
 
-#define PI 3.14159265f
 #define UNIFORM_SAMPLING 0
 
 // Share of the range of inverse distance over which half of the preference for far planes builds up.
@@ -19,7 +18,9 @@ FN vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
 }
 
 FN vec3 normal_from_angles(float theta, float phi) {
-  return vec3(sin(phi) * cos(theta), sin(phi) * sin(theta), cos(phi));
+  vec2 around = unit_vector(theta);
+  vec2 from_pole = unit_vector(phi);
+  return vec3(from_pole.y * around.x, from_pole.y * around.y, from_pole.x);
 }
 
 // A distance drawn from the range as the options ask, u in [0, 1).
@@ -43,7 +44,7 @@ FN vec3 random_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, int slot) {
   for (int attempt = 0; attempt < 4; ++attempt) {
     vec4 u = draw4(CONTEXT pixel, slot + attempt);
     float distance = draw_distance(CONTEXT u.x);
-    m = plane_through(ray, distance, normal_from_angles(2.0f * PI * u.y, PI * u.z));
+    m = plane_through(ray, distance, normal_from_angles(2.0f * HALF_TURN * u.y, HALF_TURN * u.z));
     if (admissible(CONTEXT ray, m)) return m;
     m = (1.0f / distance) * ray;
   }
@@ -63,8 +64,8 @@ FN vec3 perturbed_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float sc
     w += scale * 0.25f * (range.w - range.z) * (2.0f * u.x - 1.0f);
     distance = 1.0f / clamp(w, range.z, range.w);
   }
-  float theta = atan(-m.y, -m.x) + scale * PI * (2.0f * u.y - 1.0f);
-  float phi = atan(sqrt(m.x * m.x + m.y * m.y), -m.z) + scale * 0.5f * PI * (2.0f * u.z - 1.0f);
+  float theta = arc_tangent(-m.y, -m.x) + scale * HALF_TURN * (2.0f * u.y - 1.0f);
+  float phi = arc_tangent(sqrt(m.x * m.x + m.y * m.y), -m.z) + scale * 0.5f * HALF_TURN * (2.0f * u.z - 1.0f);
   return plane_through(ray, distance, normal_from_angles(theta, phi));
 }
 

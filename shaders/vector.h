@@ -54,11 +54,6 @@ FN Vector3<T> cross(Vector3<T> a, Vector3<T> b) {
 
 FN float sqrt(float a) { return ::sqrtf(a); }
 FN double sqrt(double a) { return ::sqrt(a); }
-FN float sin(float a) { return ::sinf(a); }
-FN float cos(float a) { return ::cosf(a); }
-FN float exp(float a) { return ::expf(a); }
-FN float exp2(float a) { return ::exp2f(a); }
-FN float log(float a) { return ::logf(a); }
 #ifdef __CUDA_ARCH__
 FN float floor(float a) { return ::floorf(a); }
 #else
@@ -68,8 +63,7 @@ FN float floor(float a) {
   return whole > a ? whole - 1.0f : whole;
 }
 #endif
-FN float atan(float y, float x) { return ::atan2f(y, x); }
-FN double atan(double y, double x) { return ::atan2(y, x); }
+FN double arc_tangent(double y, double x) { return ::atan2(y, x); }
 FN float abs(float a) { return ::fabsf(a); }
 FN double abs(double a) { return ::fabs(a); }
 FN int abs(int a) { return a < 0 ? -a : a; }
@@ -93,3 +87,5 @@ FN uint float_as_uint(float a) {
   memcpy(&u, &a, sizeof u);
   return u;
 }
+
+#include "elementary.glsl"

@@ -35,7 +35,7 @@ enum class PatchPattern : int {
 /// How intensities between pixels are found, always bilinear (values of the kernels,
 /// shaders/patch.glsl).
 enum class Filter : int {
-  exact = 0,   ///< in single precision, the same on every device
+  exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
   device = 1,  ///< by the texture units of a GPU, several times as fast; their positions are
                ///< rounded, to 1/256 pixel on most. On CPUs exact
 };

@@ -108,10 +108,6 @@ struct Algorithm {
     atomicMin(context.transfer_winner + transfer_index(CONTEXT p), index);
   }
 
-  /// Of weights and confidences, for which the hardware's precision does: two instructions of PTX
-  /// instead of eleven in the loop over a patch.
-  FN float exp(float a) { return __expf(a); }
-
   // The order matters.
   // clang-format off
 #include "random.glsl"

@@ -18,7 +18,7 @@ using real = geometry::Dual;
 using real2 = Vector2<real>;
 using real3 = Vector3<real>;
 using real4 = Vector4<real>;
-using geometry::atan;
+using geometry::arc_tangent;
 using geometry::sqrt;
 #include "camera.glsl"
 }  // namespace widestereo::kernel::dual

@@ -41,7 +41,7 @@ inline Dual sqrt(const Dual& a) {
   return {root,
           root > 0 ? Eigen::RowVector3d(a.derivative / (2 * root)) : Eigen::RowVector3d::Zero()};
 }
-inline Dual atan(const Dual& y, const Dual& x) {
+inline Dual arc_tangent(const Dual& y, const Dual& x) {
   const double square = y.value * y.value + x.value * x.value;
   return {std::atan2(y.value, x.value), (x.value * y.derivative - y.value * x.derivative) / square};
 }

@@ -46,7 +46,7 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, const Opt
   const auto inverse_scale = [](double grey_levels) {
     return grey_levels > 0 ? static_cast<float>(255 / grey_levels) : 0.0f;
   };
-  p.support = {inverse_scale(options.weight_scale) * std::numbers::log2e_v<float>,
+  p.support = {inverse_scale(options.weight_scale),
                inverse_scale(options.regression_scale), single(options.ambiguity_margin),
                single(options.far_preference)};
   const int views = static_cast<int>(all.size());

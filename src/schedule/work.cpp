@@ -18,7 +18,7 @@ constexpr int map_offset_affine = 4;
 constexpr int map_offset_quadratic = 8;
 constexpr int map_axis = 15;
 constexpr int map_corners = 9;
-constexpr int weight_of_sample = 2;  // a product and an exponential
+constexpr int weight_of_sample = 7;  // a product, growth() and a division
 constexpr int zncc_cost = 15;        // and the visible share's limit
 
 /// Texture units filter by themselves.

@@ -53,9 +53,6 @@ T tex2D(cudaTextureObject_t object, float x, float y) {
          (1 - fx) * fy * texel(0, 1) + fx * fy * texel(1, 1);
 }
 
-// As the hardware, by a power of two; glibc has a function of the same name.
-#define __expf(a) ::exp2f(1.442695041f * (a))
-
 inline unsigned atomicMax(unsigned* address, unsigned value) {
   unsigned seen = __atomic_load_n(address, __ATOMIC_RELAXED);
   while (seen < value && !__atomic_compare_exchange_n(address, &seen, value, true, __ATOMIC_RELAXED,
