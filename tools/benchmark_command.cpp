@@ -7,6 +7,7 @@
 #include "benchmark_measurement.h"
 #include "benchmark_plot.h"
 #include "commands.h"
+#include "match_settings.h"
 #include "roofline.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -23,6 +24,8 @@ struct BenchmarkArguments {
   std::vector<std::string> presets = {"fast", "quality"};
   std::vector<int> sizes = {256};
   std::vector<int> window_radii;
+  std::optional<ws::PatchWarp> warp;
+  std::optional<ws::Filter> filter;
   int runs = 3;
   ws::DevicePeaks peaks;
   std::string output;
@@ -116,6 +119,8 @@ void run_benchmark(BenchmarkArguments a) {
     for (const std::string& preset : a.presets) {
       ws::Options options = ws::Options::preset_named(preset);
       std::tie(options.min_distance, options.max_distance) = ws::demo_distance_range();
+      options.warp = a.warp.value_or(options.warp);
+      options.filter = a.filter.value_or(options.filter);
       const std::vector<int> own = {options.window_radius};
       for (const int radius : a.window_radii.empty() ? own : a.window_radii) {
         options.window_radius = radius;
@@ -156,6 +161,10 @@ void add_benchmark_command(CLI::App& app) {
                    "Patches of (2 r + 1)^2 pixels, the presets' own by default")
       ->delimiter(',')
       ->check(CLI::Range(1, 15));
+  command->add_option("--warp", a->warp, "exact, affine or quadratic instead of the presets' own")
+      ->transform(warp_names());
+  command->add_option("--filter", a->filter, "exact or device instead of the presets' own")
+      ->transform(filter_names());
   command->add_option("--runs", a->runs, "Timed runs of each")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

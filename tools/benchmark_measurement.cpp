@@ -90,6 +90,7 @@ Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::
   m.preset = options.preset;
   m.size = pair.rig.views[0].camera.width;
   m.window_radius = options.window_radius;
+  m.options = ws::to_json(options);
   m.wall = wall[wall.size() / 2];
   m.wall_min = wall.front();
   m.wall_max = wall.back();
@@ -113,6 +114,7 @@ Json json_of(const Measurement& m) {
           {"preset", m.preset},
           {"size", m.size},
           {"window_radius", m.window_radius},
+          {"options", Json::parse(m.options)},
           {"milliseconds", m.wall},
           {"milliseconds_min", m.wall_min},
           {"milliseconds_max", m.wall_max},

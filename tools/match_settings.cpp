@@ -19,6 +19,18 @@ void take(T& target, const std::optional<T>& given) {
 
 }  // namespace
 
+CLI::Validator warp_names() {
+  return CLI::CheckedTransformer(
+      std::map<std::string, PatchWarp>{{"exact", PatchWarp::exact},
+                                       {"affine", PatchWarp::affine},
+                                       {"quadratic", PatchWarp::quadratic}});
+}
+
+CLI::Validator filter_names() {
+  return CLI::CheckedTransformer(
+      std::map<std::string, Filter>{{"exact", Filter::exact}, {"device", Filter::device}});
+}
+
 void MatchSettings::add_to(CLI::App& command) {
   const std::string devices = "Device";
   command
@@ -50,11 +62,7 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--max-distance", max_distance, "Farthest distance along the ray, metres");
   add("--seed", seed, "Seed of the random numbers");
   add("--window-radius", window_radius, "Patch of (2 r + 1)^2 pixels");
-  add("--warp", warp, "How a patch is mapped: exact, affine or quadratic")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, PatchWarp>{{"exact", PatchWarp::exact},
-                                           {"affine", PatchWarp::affine},
-                                           {"quadratic", PatchWarp::quadratic}}));
+  add("--warp", warp, "How a patch is mapped: exact, affine or quadratic")->transform(warp_names());
   add("--sampling", sampling, "How distances are drawn: uniform or inverse")
       ->transform(CLI::CheckedTransformer(std::map<std::string, DistanceSampling>{
           {"uniform", DistanceSampling::uniform}, {"inverse", DistanceSampling::inverse}}));
@@ -69,8 +77,7 @@ void MatchSettings::add_to(CLI::App& command) {
           {"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
   add("--weight-scale", weight_scale, "Intensity scale of patch weights, grey levels; 0 = none");
   add("--filter", filter, "Intensities between pixels: exact, or device (texture units of a GPU)")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Filter>{{"exact", Filter::exact}, {"device", Filter::device}}));
+      ->transform(filter_names());
   add("--levels", levels, "Levels of the image pyramid");
   add("--sweep-steps", sweep_steps, "Inverse distances tried at the coarsest level");
   add("--level-iterations", level_iterations, "Iterations of each level, coarsest first")

@@ -248,6 +248,15 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   EXPECT_NE(picture.find("% of operations"), std::string::npos);
   EXPECT_EQ(picture.substr(picture.size() - 7), "</svg>\n");
 
+  const Outcome exact =
+      run("benchmark --devices cpu --presets fast --sizes 64 --runs 1 --warp exact --filter exact "
+          "--json");
+  ASSERT_EQ(exact.exit_code, 0) << exact.output;
+  const nlohmann::json exact_row = nlohmann::json::parse(exact.output)[0];
+  EXPECT_EQ(exact_row["options"]["warp"], "exact");
+  EXPECT_EQ(exact_row["options"]["filter"], "exact");
+  EXPECT_GT(exact_row["on_device"]["operations"], 1.5 * operations) << "the warp of each sample";
+
   const Outcome unknown = run("benchmark --devices cpu --presets fast --sizes 64 --runs 1");
   EXPECT_EQ(unknown.exit_code, 0) << unknown.output;
   EXPECT_EQ(unknown.output.find("% of"), std::string::npos) << unknown.output;
