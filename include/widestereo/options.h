@@ -36,8 +36,8 @@ enum class PatchPattern : int {
 /// shaders/patch.glsl).
 enum class Filter : int {
   exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
-  device = 1,  ///< by the texture units of a GPU, several times as fast; their positions are
-               ///< rounded, to 1/256 pixel on most. On CPUs exact
+  device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their
+               ///< positions are rounded, to 1/256 pixel on most. On CPUs exact
 };
 
 /// How planes are found.
