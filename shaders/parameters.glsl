@@ -23,7 +23,7 @@ struct MatchParameters {
                       // support
   vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
   ivec4 search;       // distance sampling, refinements, best sources, number of views
-  vec4 support;       // log2(e) / intensity scale of the patch's weights; 1 / that of the regression's weights; margin of ambiguity;
+  vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
                       // preference for far planes
   ivec4 frame;        // number of the frame since the last one that was started anew; unused
   CameraParameters cameras[MAX_VIEWS];

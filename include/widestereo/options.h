@@ -65,10 +65,10 @@ struct Options {
       4;  ///< random perturbations per pixel and iteration, 0..16; range halved each time
   int best_sources = 1;  ///< cost = mean of this many best source views, >= 1
   PatchPattern pattern = PatchPattern::dense;
-  /// Weight exp(-|difference| / scale) of a sample whose intensity differs from the centre's, grey
-  /// levels of 255; 0 = all weigh the same.
+  /// Weight (1 + |difference| / (8 scale))^-8, about exp(-|difference| / scale), of a sample whose
+  /// intensity differs from the centre's, grey levels of 255; 0 = all weigh the same.
   double weight_scale = 0;
-  Filter filter = Filter::device;
+  Filter filter = Filter::device;  ///< how samples between pixels are read
 
   /// Of SearchMethod::pyramid.
   int levels = 3;                                 ///< each half the size of the finer one, 1..4

@@ -7,8 +7,7 @@
 #include "widestereo/error.h"
 
 namespace widestereo {
-namespace {
-
+// In the enumerations' namespace, where the conversion is looked up.
 NLOHMANN_JSON_SERIALIZE_ENUM(PatchWarp, {{PatchWarp::exact, "exact"},
                                          {PatchWarp::affine, "affine"},
                                          {PatchWarp::quadratic, "quadratic"}})
@@ -21,6 +20,8 @@ NLOHMANN_JSON_SERIALIZE_ENUM(SearchMethod,
                              {{SearchMethod::random, "random"}, {SearchMethod::pyramid, "pyramid"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Propagation, {{Propagation::checkerboard, "checkerboard"},
                                            {Propagation::raster, "raster"}})
+
+namespace {
 
 void require_between(double value, double low, double high, const std::string& name) {
   if (value >= low && value <= high) return;  // false for NaN

@@ -46,9 +46,8 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, const Opt
   const auto inverse_scale = [](double grey_levels) {
     return grey_levels > 0 ? static_cast<float>(255 / grey_levels) : 0.0f;
   };
-  p.support = {inverse_scale(options.weight_scale),
-               inverse_scale(options.regression_scale), single(options.ambiguity_margin),
-               single(options.far_preference)};
+  p.support = {inverse_scale(options.weight_scale), inverse_scale(options.regression_scale),
+               single(options.ambiguity_margin), single(options.far_preference)};
   const int views = static_cast<int>(all.size());
   p.search = {static_cast<int>(options.sampling), options.refinements, options.best_sources, views};
   for (int i = 0; i < views; ++i) {
