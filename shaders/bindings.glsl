@@ -35,11 +35,16 @@ float intensity_at(int view, ivec2 p) {
   return imageLoad(intensities, texel).x;
 }
 
+// Texture coordinates of a position in texels of the memory.
+vec3 texture_position(int view, vec2 texel) {
+  vec2 texel_size = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
+  return vec3(texel * texel_size, float(view));
+}
+
 vec4 intensity_taps(int view, ivec2 p) {
   if (SAMPLED) {
     // The corner that the four texels share lies half a texel from any rounding trouble.
-    vec2 texel = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
-    vec4 taps = textureGather(intensity_texture, vec3(vec2(p + APRON + 1) * texel, float(view)));
+    vec4 taps = textureGather(intensity_texture, texture_position(view, vec2(p + APRON + 1)));
     return vec4(taps.w, taps.z, taps.x, taps.y);
   }
   return vec4(intensity_at(view, p), intensity_at(view, p + ivec2(1, 0)),
@@ -47,8 +52,7 @@ vec4 intensity_taps(int view, ivec2 p) {
 }
 
 float filtered_intensity_at(int view, vec2 texel) {
-  vec2 size = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
-  return textureLod(intensity_texture, vec3(texel * size, float(view)), 0.0f).x;
+  return textureLod(intensity_texture, texture_position(view, texel), 0.0f).x;
 }
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }

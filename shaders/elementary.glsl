@@ -7,14 +7,6 @@
 #define QUARTER_TURN 1.57079633f
 #define HALF_TURN 3.14159265f
 
-// About exp(a) for a >= 0: the 8th power of 1 + a / 8.
-FN float growth(float a) {
-  float t = 1.0f + 0.125f * a;
-  t = t * t;
-  t = t * t;
-  return t * t;
-}
-
 // Angle of the point (x, y), as atan2; to 1e-7 rad.
 FN float arc_tangent(float y, float x) {
   float larger = max(abs(x), abs(y));

@@ -187,6 +187,14 @@ FN int first_column(CONTEXT_ARGUMENT int row) {
   return -WINDOW_RADIUS + (PATTERN == PATTERN_CHECKERBOARD ? (WINDOW_RADIUS + row) & 1 : 0);
 }
 
+// About exp(a) for a >= 0: the 8th power of 1 + a / 8, with the same bits everywhere (elementary.glsl).
+FN float growth(float a) {
+  float t = 1.0f + 0.125f * a;
+  t = t * t;
+  t = t * t;
+  return t * t;
+}
+
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
 // which loops read once. Zero for masked samples; others differ by 1 at most.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {

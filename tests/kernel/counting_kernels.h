@@ -37,15 +37,7 @@ inline Number& operator+=(Number& a, Number b) { return a = a + b; }
 inline Number& operator-=(Number& a, Number b) { return a = a - b; }
 inline auto operator<=>(Number a, Number b) { return a.value <=> b.value; }
 inline bool operator==(Number a, Number b) { return a.value == b.value; }
-/// Of which only arithmetic is left.
-inline Number growth(Number a) {
-  Number t = Number(1.0f) + Number(0.125f) * a;
-  t = t * t;
-  t = t * t;
-  return t * t;
-}
 inline Number sqrt(Number a) { return counted(std::sqrt(a.value)); }
-inline Number exp(Number a) { return counted(std::exp(a.value)); }
 inline Number arc_tangent(Number y, Number x) { return counted(std::atan2(y.value, x.value)); }
 inline Number abs(Number a) { return std::fabs(a.value); }
 inline Number floor(Number a) { return std::floor(a.value); }
