@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Lets glslang, nvcc and g++ compile the same kernel source. Rules of the subset: float literals with
-// f, no swizzles, no array parameters, float(i) casts, OUT(T) instead of out, everything an accessor
-// or a launch needs passed behind CONTEXT (nothing in GLSL, a reference in C++ and CUDA).
+// f, no swizzles, no array parameters, float(i) casts, OUT(T) and INOUT(T) instead of out and inout,
+// everything an accessor or a launch needs passed behind CONTEXT (nothing in GLSL, a reference in C++
+// and CUDA).
 //
 // A back end provides, before including the algorithm:
 //   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
@@ -26,6 +27,7 @@
 #define UNROLL_ROWS
 #endif
 #define OUT(T) T&
+#define INOUT(T) T&
 #define CONTEXT context,
 #define CONTEXT_ONLY context
 #define CONTEXT_ARGUMENT const Context &context,
@@ -42,6 +44,7 @@
 #define UNROLL
 #define UNROLL_ROWS
 #define OUT(T) out T
+#define INOUT(T) inout T
 #define CONTEXT
 #define CONTEXT_ONLY
 #define CONTEXT_ARGUMENT

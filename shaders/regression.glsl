@@ -10,10 +10,14 @@
 #define LARGEST_RESIDUAL 0.6f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
-// Rounds, the last two over the whole radius, the others over a quarter and a half of it.
+// Rounds for distances, the last two over the whole radius, the others over a quarter and a half of it.
 #define REGRESSION_ROUNDS 4
 #define WHOLE_RADIUS_ROUND 2
-// Bits of PASS.candidates: see regress_pixel() and adopt_pixel().
+// Rounds for normals alone: over an eighth, twice a half, and the whole radius.
+#define NORMAL_ROUNDS 4
+// Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
+#define LARGEST_SLOPE_CHANGE 6.0f
+// Bits of PASS.candidates: see regress_plane() and adopt_pixel().
 #define REGRESS_NORMALS 1u
 #define ADOPT_UNSEEN 2u
 // First random slot; the search uses lower ones.
@@ -106,15 +110,21 @@ struct LocalPlane {
   float slope_y;
 };
 
+struct PlaneFit {
+  LocalPlane plane;
+  float certainty;   // inverse variance of the offset, as if each pixel of the neighbourhood were measured by itself
+  vec3 information;  // inverse covariance of the slopes (xx, xy, yy), of the grid's pixels alone
+};
+
 // One round of robust weighted least squares over a sparse grid of the neighbourhood; false where it is
-// degenerate. `certainty`: inverse variance of the offset, as if each pixel of the neighbourhood were measured
-// by itself.
+// degenerate.
 FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, float own_variance,
-                  int round, LocalPlane guess, OUT(LocalPlane) fitted, OUT(float) certainty) {
-  fitted = guess;
+                  int round, int radius, LocalPlane guess, OUT(PlaneFit) fit) {
+  fit.plane = guess;
+  fit.certainty = 0.0f;
+  fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float centre = intensity_at(CONTEXT PASS.reference, pixel);
-  int radius = max(PASS.steps >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
   float fall_off = 2.0f / float(radius * radius);
   int step = max(radius / 3, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
@@ -165,7 +175,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       syw += weight * difference * y;
     }
   }
-  certainty = s * float(step * step);
+  fit.certainty = s * float(step * step);
   if (!(s > 0.0f)) return false;
   float mx = sx / s;
   float my = sy / s;
@@ -178,15 +188,62 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float cyw = syw - sw * my + pull * guess.slope_y;
   float determinant = cxx * cyy - cxy * cxy;
   if (!(determinant > 1e-9f * cxx * cyy)) return false;
-  fitted.slope_x = (cyy * cxw - cxy * cyw) / determinant;
-  fitted.slope_y = (cxx * cyw - cxy * cxw) / determinant;
-  fitted.offset = guess.offset + sw / s - fitted.slope_x * mx - fitted.slope_y * my;
+  fit.information = vec3(cxx, cxy, cyy);
+  fit.plane.slope_x = (cyy * cxw - cxy * cyw) / determinant;
+  fit.plane.slope_y = (cxx * cyw - cxy * cxw) / determinant;
+  fit.plane.offset = guess.offset + sw / s - fit.plane.slope_x * mx - fit.plane.slope_y * my;
   return true;
 }
 
-// Stores the plane of the smallest neighbourhood that determines it to PASS.step_pixels (m, 1) as the pixel's
-// prior, zero where there is none. With REGRESS_NORMALS the whole neighbourhood gives the normal; without
-// PASS.step_pixels it gives nothing else, and the pixel keeps its distance.
+// The plane of the smallest neighbourhood that determines its offset to PASS.step_pixels. With REGRESS_NORMALS
+// the whole neighbourhood gives the slopes.
+FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
+                      INOUT(LocalPlane) plane) {
+  bool normals = (PASS.candidates & REGRESS_NORMALS) != 0u;
+  bool determined = false;
+  bool found = false;
+  float offset = plane.offset;
+  for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
+    // What has its offset needs but one more round for its slopes.
+    if (determined && round < REGRESSION_ROUNDS - 1) continue;
+    int radius = max(PASS.steps >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
+    PlaneFit fit;
+    if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, radius, plane, fit)) continue;
+    plane = fit.plane;
+    found = true;
+    if (!determined) offset = plane.offset;
+    if (fit.certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) determined = true;
+    if (determined && !normals) break;
+  }
+  plane.offset = offset;
+  return found;
+}
+
+// The slopes of the largest neighbourhood that does not contradict the smallest: wide where surfaces are plane,
+// narrow at their edges.
+FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
+                       INOUT(LocalPlane) plane) {
+  bool found = false;
+  float offset = plane.offset;
+  PlaneFit first;
+  for (int round = 0; round < NORMAL_ROUNDS; ++round) {
+    int radius = round == 0 ? PASS.steps / 8 : (round < NORMAL_ROUNDS - 1 ? PASS.steps / 2 : PASS.steps);
+    PlaneFit fit;
+    if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, max(radius, 2), plane, fit)) continue;
+    if (!found) first = fit;
+    float x = fit.plane.slope_x - first.plane.slope_x;
+    float y = fit.plane.slope_y - first.plane.slope_y;
+    vec3 information = first.information;
+    if (x * x * information.x + 2.0f * (x * y * information.y) + y * y * information.z > LARGEST_SLOPE_CHANGE) break;
+    plane = fit.plane;
+    found = true;
+  }
+  plane.offset = offset;
+  return found;
+}
+
+// Stores the regressed plane (m, 1) as the pixel's prior, zero where there is none. Without PASS.step_pixels the
+// pixel keeps its distance and gets a normal alone.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -203,24 +260,8 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.slope_x = dot(m, east) / TANGENT_SCALE;
     plane.slope_y = dot(m, south) / TANGENT_SCALE;
     vec4 own = check_at(CONTEXT PASS.reference, pixel);
-    bool normals = (PASS.candidates & REGRESS_NORMALS) != 0u;
-    bool has_distance = PASS.step_pixels == 0.0f;
-    bool found = false;
-    float w = plane.offset;
-    bool only_normals = has_distance;
-    for (int round = only_normals ? WHOLE_RADIUS_ROUND : 0; round < REGRESSION_ROUNDS; ++round) {
-      // What has its distance needs but one more round for its normal.
-      if (has_distance && !only_normals && round < REGRESSION_ROUNDS - 1) continue;
-      LocalPlane fitted;
-      float certainty;
-      if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, plane, fitted, certainty)) continue;
-      plane = fitted;
-      found = true;
-      if (!has_distance) w = plane.offset;
-      if (certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) has_distance = true;
-      if (has_distance && !normals) break;
-    }
-    plane.offset = w;
+    bool found = PASS.step_pixels > 0.0f ? regress_plane(CONTEXT pixel, ray, east, south, own, plane)
+                                         : regress_slopes(CONTEXT pixel, ray, east, south, own, plane);
     vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
                      (TANGENT_SCALE * plane.slope_y) * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);

@@ -180,13 +180,13 @@ class Builder {
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) {
-          regress(view, level, options_.regression_precision, false);
+          regress(view, level, options_.regression_precision);
         }
         if (level == 0) repair();
       }
     }
     if (options_.level_regressions.back() > 0) {
-      for (const int view : views_of(0)) regress(view, 0, 0, true);
+      for (const int view : views_of(0)) regress(view, 0, 0);
     }
   }
 
@@ -323,19 +323,19 @@ class Builder {
   }
 
   /// `precision`: 0 leaves the distances as they are.
-  void regress(int view, int level, double precision, bool normals) {
+  void regress(int view, int level, double precision) {
     add(Kernel::measure, pass_of(view), view, 0);
-    regress_measured(view, level, precision, normals ? regress_normals : 0);
+    regress_measured(view, level, precision, 0);
   }
 
   void regress_measured(int view, int level, double precision, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
-    // A third at coarse levels, where a pixel covers more of the scene. Twice as much for normals
-    // alone: a slope needs a wider base than a distance.
+    // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
+    // normals alone: a slope needs a wider base than a distance.
     pass.steps =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
-    if (precision == 0) pass.steps *= 2;
+    if (precision == 0) pass.steps *= 4;
     pass.step_pixels = static_cast<float>(precision);
     pass.candidates = how;
     add(Kernel::regress, pass, view, 0);

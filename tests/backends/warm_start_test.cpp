@@ -20,10 +20,10 @@ using ::testing::HasSubstr;
 
 constexpr int size = 96;
 
-/// Camera 0 to world of frame `k`: a step of 5 cm and two degrees each.
+/// Camera 0 to world of frame `k`: a step of 15 cm and six degrees each, some pixels.
 Eigen::Isometry3d pose(int k) {
-  return Eigen::Translation3d(0.05 * k, -0.01 * k, 0.02 * k) *
-         Eigen::AngleAxisd(0.035 * k, Eigen::Vector3d(0.2, 1, 0.1).normalized());
+  return Eigen::Translation3d(0.15 * k, -0.03 * k, 0.06 * k) *
+         Eigen::AngleAxisd(0.105 * k, Eigen::Vector3d(0.2, 1, 0.1).normalized());
 }
 
 Eigen::Isometry3d motion_to(int k) { return pose(k).inverse() * pose(k - 1); }
@@ -62,6 +62,7 @@ TEST_P(WarmStarts, ReachColdAccuracyWithAQuarterOfTheWork) {
   Matcher warm(*device, frame(0).rig, options);
   Matcher alone(*device, frame(0).rig, options);
   warm.match(images_of(frame(0)));
+  double more_wrong = 0;
   for (int k = 1; k < 3; ++k) {
     const StereoResult result =
         warm.match_next(images_of(frame(k)), {.now_from_previous = motion_to(k), .frame = k});
@@ -69,11 +70,14 @@ TEST_P(WarmStarts, ReachColdAccuracyWithAQuarterOfTheWork) {
     EXPECT_LE(4 * result.samples, cold.samples);
     const RegionScores scores = scores_of(result, frame(k));
     const RegionScores expected = scores_of(cold, frame(k));
-    EXPECT_LT(scores.bad_relative.at(0.02), expected.bad_relative.at(0.02) + 0.02) << k;
-    EXPECT_LT(scores.bad_pixels.at(1.0), expected.bad_pixels.at(1.0) + 0.02) << k;
+    EXPECT_LT(scores.bad_pixels.at(1.0), expected.bad_pixels.at(1.0) + 0.002) << k;
+    EXPECT_LT(scores.bad_pixels.at(0.5), expected.bad_pixels.at(0.5) + 0.02) << k;
+    more_wrong += scores.bad_relative.at(0.05) - expected.bad_relative.at(0.05);
     // Planes stay where the other view cuts their patches off.
     EXPECT_GT(scores.completeness, expected.completeness - 0.001) << k;
   }
+  // At this size 5 % is a tenth of a pixel: seeds differ by three points. Unmoved planes lose seven.
+  EXPECT_LT(more_wrong / 2, 0.04);
   expect_no_validation_messages(*device);
 }
 

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: MIT
+// The plane regression on maps with known planes, known noise and known edges.
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "kernel_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using kernel::ivec2;
+using kernel::vec3;
+
+constexpr int size = 96;
+/// Movement in the source, pixels per unit of inverse distance.
+constexpr double speed = 3;
+
+Options options() {
+  Options options = Options::preset_named("fast");
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  return options;
+}
+
+double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / CV_PI;
+}
+
+/// View 0 of evenly grey images, whose planes were measured with known precision.
+class Regression : public ::testing::Test {
+ protected:
+  using Truth = std::function<Eigen::Vector3d(int x)>;
+
+  Regression() : fixture_(fisheye_rig(size), options()) {
+    fixture_.view(0).image().setTo(0.5);
+    fixture_.set_reference(0);
+  }
+
+  Eigen::Vector3d ray(ivec2 pixel) {
+    const cv::Vec4f r = fixture_.view(0).rays(pixel.y, pixel.x);
+    return {r[0], r[1], r[2]};
+  }
+
+  /// Fills the view with the planes of `truth` by column, their displacement in the source wrong by
+  /// `noise` pixels (standard deviation) and the tangent of their tilt by `tilt`.
+  void measure(const Truth& truth, double noise, double tilt) {
+    cv::RNG random(7);
+    for (int y = 0; y < size; ++y) {
+      for (int x = 0; x < size; ++x) {
+        const Eigen::Vector3d r = ray({x, y});
+        const Eigen::Vector3d m = truth(x);
+        const Eigen::Vector3d wrong(random.gaussian(tilt), random.gaussian(tilt), 0);
+        const Eigen::Vector3d tangent = m.norm() * (wrong - wrong.dot(r) * r);
+        const Eigen::Vector3d held = m + random.gaussian(noise / speed) * r + tangent;
+        fixture_.view(0).hypotheses(y, x) =
+            cv::Vec4f(static_cast<float>(held.x()), static_cast<float>(held.y()),
+                      static_cast<float>(held.z()), 0.1f);
+      }
+    }
+    fixture_.view(0).checks.setTo(cv::Scalar(noise * noise, speed, 0, 0));
+  }
+
+  /// m of the regressed plane; zero where there is none.
+  Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision) {
+    fixture_.pass().steps = radius;
+    fixture_.pass().step_pixels = static_cast<float>(precision);
+    fixture_.pass().candidates = 0;
+    kernel::cpu::regress_pixel(fixture_.context(), pixel);
+    const cv::Vec4f prior = fixture_.view(0).priors(pixel.y, pixel.x);
+    return {prior[0], prior[1], prior[2]};
+  }
+
+  /// Displacement in the source (px) of a plane's point from that of the true one.
+  double displacement(ivec2 pixel, const Eigen::Vector3d& plane, const Eigen::Vector3d& truth) {
+    return std::abs((plane - truth).dot(ray(pixel))) * speed;
+  }
+
+  /// Root mean square over a grid of pixels with columns `first` to `last`.
+  double over_pixels(int first, int last, const std::function<double(ivec2)>& error) {
+    double sum = 0;
+    int count = 0;
+    for (int y = 24; y <= 72; y += 4) {
+      for (int x = first; x <= last; x += 2, ++count) {
+        const double e = error({x, y});
+        sum += e * e;
+      }
+    }
+    return std::sqrt(sum / count);
+  }
+
+  KernelFixture fixture_;
+};
+
+const Eigen::Vector3d wall(0.05, 0.1, 0.5);
+
+TEST_F(Regression, IsAboutAsPreciseAsAskedFor) {
+  const double noise = 0.1;
+  measure([](int) { return wall; }, noise, 0.3);
+  const auto error = [&](double precision) {
+    return over_pixels(24, 72, [&](ivec2 pixel) {
+      return displacement(pixel, regressed(pixel, 18, precision), wall);
+    });
+  };
+  // It looks at every other pixel or fewer, but counts all.
+  EXPECT_LT(error(0.03), 1.5 * 0.03);
+  EXPECT_LT(error(0.015), 1.5 * 0.015);
+  EXPECT_GT(error(0.06), 1.5 * 0.015) << "a smaller neighbourhood is enough";
+}
+
+TEST_F(Regression, DoesNotBlendSurfaces) {
+  const auto step = [](int x) -> Eigen::Vector3d { return x < 48 ? wall : 2 * wall; };
+  measure(step, 0.05, 0.1);
+  for (const auto& [first, last] : {std::pair(40, 47), std::pair(48, 55)}) {
+    EXPECT_LT(over_pixels(first, last,
+                          [&](ivec2 pixel) {
+                            return displacement(pixel, regressed(pixel, 18, 0.015), step(pixel.x));
+                          }),
+              0.03)
+        << "columns " << first << " to " << last;
+  }
+}
+
+TEST_F(Regression, FillsWhatWasNotMeasuredFromAround) {
+  measure([](int) { return wall; }, 0.05, 0.1);
+  const cv::Rect weak(44, 44, 9, 9);
+  fixture_.view(0).hypotheses(weak).setTo(cv::Scalar(0.06, 0.12, 0.6, 0.9));
+  fixture_.view(0).checks(weak).setTo(cv::Scalar(UNMEASURED_VARIANCE, speed, 0, 0));
+  const ivec2 pixel(48, 48);
+  EXPECT_LT(displacement(pixel, regressed(pixel, 18, 0.015), wall), 0.02);
+  fixture_.view(0).checks.setTo(cv::Scalar(UNMEASURED_VARIANCE, speed, 0, 0));
+  EXPECT_EQ(regressed(pixel, 18, 0.015), Eigen::Vector3d::Zero()) << "nothing to fill from";
+}
+
+TEST_F(Regression, OfNormalsAloneKeepsDistancesAndUsesAllOfAPlane) {
+  measure([](int) { return wall; }, 0.05, 0.05);
+  const double error = over_pixels(24, 72, [&](ivec2 pixel) {
+    const Eigen::Vector3d found = regressed(pixel, 48, 0);
+    const cv::Vec4f held = fixture_.view(0).hypotheses(pixel.y, pixel.x);
+    EXPECT_NEAR(found.dot(ray(pixel)), Eigen::Vector3d(held[0], held[1], held[2]).dot(ray(pixel)),
+                1e-6);
+    return degrees_between(found, wall);
+  });
+  EXPECT_LT(error, 1.5);
+}
+
+TEST_F(Regression, OfNormalsAloneStopsAtTheEndOfASmallSurface) {
+  // A tilted board before the wall, 16 pixels wide: the whole neighbourhood is all but wall.
+  const auto board = [](int x) { return Eigen::Vector3d(40 <= x && x < 56 ? 0.3 : 0, 0, 0.5); };
+  measure(board, 0.02, 0.02);
+  const double error = over_pixels(44, 51, [&](ivec2 pixel) {
+    return degrees_between(regressed(pixel, 48, 0), board(pixel.x));
+  });
+  EXPECT_LT(error, 5);
+}
+
+}  // namespace
+}  // namespace widestereo::test
