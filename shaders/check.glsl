@@ -19,6 +19,8 @@
 #define SUPPORT_STEP 4
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
+// Mean squared correlation of the surroundings below which their planes are not known from the images.
+#define ENOUGH_EVIDENCE 0.1f
 
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -62,11 +64,12 @@ FN float speed_in_sources(CONTEXT_ARGUMENT vec3 ray, float w) {
   return speed;
 }
 
-// Share of the surrounding planes that put the pixel's point where its own does. `speed`: source pixels per
-// unit of inverse distance.
-FN float support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
+// Of the surrounding planes: the share that puts the pixel's point where its own does (x) and the mean of their
+// squared correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
+FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
   float planes = 0.0f;
   float supporting = 0.0f;
+  float evidence = 0.0f;
   for (int dy = -SUPPORT_RADIUS; dy <= SUPPORT_RADIUS; dy += SUPPORT_STEP) {
     for (int dx = -SUPPORT_RADIUS; dx <= SUPPORT_RADIUS; dx += SUPPORT_STEP) {
       ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
@@ -74,11 +77,14 @@ FN float support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w
       vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
       if (plane.w >= INVALID_COST) continue;
       planes += 1.0f;
+      float correlation = max(1.0f - plane.w, 0.0f);
+      evidence += correlation * correlation;
       float difference = inverse_distance_of(plane, ray) - w;
       if (abs(difference) * speed < SUPPORT_DISPLACEMENT) supporting += 1.0f;
     }
   }
-  return supporting / max(planes, 1.0f);
+  float share = 1.0f / max(planes, 1.0f);
+  return vec2(supporting * share, evidence * share);
 }
 
 // Whether the patch matches better by more than the margin at one of PASS.steps places: 2, 4, 8 ... source
@@ -99,11 +105,12 @@ FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float sp
 
 // Probability that the point lies within two source pixels of its true place: a logistic model of the
 // displacement from the source's own plane (px), the support of the surroundings and the variance of intensity
-// that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md).
-FN float confidence_of(float displacement, float support, float unexplained) {
+// that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md). Where next to nothing matches
+// around, as in the dark beyond the lens circle, planes agree because nothing contradicts them.
+FN float confidence_of(float displacement, float support, float unexplained, float evidence) {
   float log_odds = 1.41f - 0.48f * logarithm(1.0f + 4.0f * displacement) + 1.44f * logarithm(support + 0.02f) -
                    0.31f * logarithm(unexplained + 1.5e-5f);
-  return 1.0f / (1.0f + exponential(-log_odds));
+  return min(evidence / ENOUGH_EVIDENCE, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -128,7 +135,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     vec4 limits = PARAMETERS.check_limits;
     float variance = reference_variance(CONTEXT pixel);
-    float support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
+    vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
     bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
     if (variance < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
     if (held.w > limits.z) reasons |= REASON_HIGH_COST;
@@ -139,10 +146,10 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     } else if (difference.x > limits.x || difference.y > limits.y) {
       reasons |= REASON_INCONSISTENT;
     }
-    if (support < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
+    if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
     if (is_ambiguous(CONTEXT pixel, ray, held, speed)) reasons |= REASON_AMBIGUOUS;
-    confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support,
-                               variance * min(held.w, 1.0f));
+    confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
+                               variance * min(held.w, 1.0f), support.y);
   }
   store_check(CONTEXT PASS.reference, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
 }

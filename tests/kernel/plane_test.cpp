@@ -300,6 +300,23 @@ TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {
   EXPECT_LT(alone, views.fixture.view(0).checks(48, 48)[2]) << "confidence falls with support";
 }
 
+TEST(Checks, AgreementWithoutEvidenceIsNotConfident) {
+  AgreeingViews views(wide_range());
+  KernelFixture& fixture = views.fixture;
+  const auto confidence_at_cost = [&](double cost_around) {
+    const vec3 m = views.plane(0);
+    fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, cost_around));
+    fixture.view(0).hypotheses(48, 48)[3] = 0.5f;
+    views.reasons({48, 48});
+    return fixture.view(0).checks(48, 48)[2];
+  };
+  EXPECT_EQ(confidence_at_cost(0.5), confidence_at_cost(0.1)) << "enough to go by";
+  EXPECT_GT(confidence_at_cost(0.5), 0.9);
+  EXPECT_LT(confidence_at_cost(0.9), 0.2);
+  EXPECT_EQ(confidence_at_cost(1.0), 0);
+  EXPECT_EQ(confidence_at_cost(1.3), 0) << "nor do contrary patches speak for a plane";
+}
+
 TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   Options options = wide_range();
   options.ambiguity_margin = 0.2;
