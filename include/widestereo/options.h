@@ -76,7 +76,7 @@ struct Options {
   std::vector<int> level_iterations = {3, 2, 1};  ///< coarsest level first, one for each level
   std::vector<int> level_regressions = {1, 1, 2};  ///< rounds of plane regression, likewise
   int regression_radius = 36;    ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
-                                 ///< normals alone twice that
+                                 ///< normals alone four times that
   double regression_scale = 12;  ///< intensity scale of the regression's weights, grey levels
   /// A neighbourhood of a quarter or half the radius is taken where it determines the plane to this
   /// standard deviation (source pixels, nominal: neighbours count as independent); > 0.

@@ -39,7 +39,7 @@ __global__ void import_pixel(CudaImage image, ViewMemory view, int height) {
   int x;
   int y;
   if (!thread_pixel(view.width, height, x, y)) return;
-  float intensity = masked_intensity;
+  float intensity = MASKED_INTENSITY;
   if (image.pixel == CudaPixel::grey8) {
     intensity = static_cast<float>(read<std::uint8_t>(image, x, y)) * scale_of_8_bits;
   } else if (image.pixel == CudaPixel::grey16) {
@@ -48,7 +48,7 @@ __global__ void import_pixel(CudaImage image, ViewMemory view, int height) {
     const float value = read<float>(image, x, y);
     if (value >= 0 && value < above_intensity) intensity = value;
   }
-  if (view.rays[y * view.width + x].w == 0) intensity = masked_intensity;
+  if (view.rays[y * view.width + x].w == 0) intensity = MASKED_INTENSITY;
   view.intensities[y * view.stride + x] = intensity;
 }
 

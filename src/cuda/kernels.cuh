@@ -21,7 +21,8 @@ struct Constants {
   static constexpr int filter = Filter;
   static constexpr int source_model = Model;
   /// On the checkerboard rows start in turn one column later: two are the same for all turns.
-  static constexpr int unrolled_rows = Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
+  static constexpr int unrolled_rows =
+      Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
 };
 using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 

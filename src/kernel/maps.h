@@ -7,7 +7,6 @@
 
 namespace widestereo::kernel {
 
-constexpr float masked_intensity = MASKED_INTENSITY;
 constexpr float no_plane_cost = 2;  ///< INVALID_COST of shaders/patch.glsl
 /// Intensities end here: 1, with room for rounding.
 constexpr float above_intensity = 1 + 1e-6f;

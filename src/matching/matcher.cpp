@@ -30,7 +30,7 @@ cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat
   cv::Mat intensity = to_intensity(image, "The image of " + view.name);
   cv::Mat usable;
   cv::extractChannel(rays, usable, 3);
-  intensity.setTo(kernel::masked_intensity, usable == 0);
+  intensity.setTo(MASKED_INTENSITY, usable == 0);
   return intensity;
 }
 

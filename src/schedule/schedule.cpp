@@ -249,11 +249,11 @@ class Builder {
     add(Kernel::renew, pass, view, 1);
   }
 
-  /// Only what corrects planes that are nearly right: the near strips, half of them for each
-  /// colour, carry surfaces into what has come into view, perturbations follow what moved; the
-  /// regression then averages.
+  /// Little more than what corrects planes that are nearly right: the near strips, half of them for
+  /// each colour, carry surfaces into what has come into view, perturbations follow what moved, and
+  /// random distances find what has come near; the regression then averages.
   void search_warm() {
-    constexpr unsigned perturbations = inverse_distance | both;
+    constexpr unsigned perturbations = inverse_distance | both | random_distance;
     for (int i = 0; i < options_.warm_iterations; ++i) {
       for (const int view : views_of(0)) {
         search(view, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});

@@ -69,19 +69,22 @@ std::uint32_t workgroups(int threads) {
   return (static_cast<std::uint32_t>(threads) + workgroup - 1) / workgroup;
 }
 
-/// The constants that the pipelines are made for: filters that the device lacks become exact.
-KernelConstants possible(KernelConstants constants, const VulkanContext& context, bool sampled) {
-  if (!sampled ||
-      !context.has_format(intensity_format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT)) {
-    constants.filter = static_cast<int>(Filter::exact);
-  }
-  return constants;
+bool filters_intensities(const VulkanContext& context) {
+  return context.has_format(intensity_format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
 }
 
-/// Gathering takes no notice of the filter.
-Handle<VkSampler> make_sampler(const VulkanContext& context, const KernelConstants& constants) {
-  const VkFilter filter =
-      constants.filter == static_cast<int>(Filter::exact) ? VK_FILTER_NEAREST : VK_FILTER_LINEAR;
+/// `sampled`: images are read as textures. Filters that the device lacks become exact.
+Pipelines make_pipelines(const VulkanContext& context, KernelConstants constants, bool sampled,
+                         VkPipelineCache cache) {
+  if (!sampled || !filters_intensities(context)) {
+    constants.filter = static_cast<int>(Filter::exact);
+  }
+  return Pipelines(context, constants, sampled, cache);
+}
+
+/// Exact filtering gathers, which takes no notice of the sampler's filter.
+Handle<VkSampler> make_sampler(const VulkanContext& context) {
+  const VkFilter filter = filters_intensities(context) ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
   VkSamplerCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO;
   info.magFilter = filter;
@@ -117,10 +120,10 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
-      sampled_(tuning.sampled.value_or(!runs_on_cpu(context))),
-      pipelines_(context, possible(constants, context, sampled_), sampled_, cache.get()),
+      pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
+                                cache.get())),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
-      sampler_(make_sampler(context, possible(constants, context, sampled_))),
+      sampler_(make_sampler(context)),
       command_pool_(make_command_pool(context)) {
   cache.save();
   make_images(context);

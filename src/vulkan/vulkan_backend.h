@@ -72,7 +72,6 @@ class VulkanBackend final : public Backend {
   std::vector<cv::Size> sizes_;
   KernelConstants constants_;
   long long max_samples_;
-  bool sampled_;
   Pipelines pipelines_;
   LayeredImage intensities_;
   LayeredImage rays_;
