@@ -84,6 +84,13 @@ nlohmann::ordered_json describe(const ws::View& first, const ws::View& second) {
           {"direction_in_first", {direction.x(), direction.y(), direction.z()}}};
 }
 
+/// Where the IMU is in the frame of view 0.
+nlohmann::ordered_json describe_imu(const Eigen::Isometry3d& first_from_imu) {
+  const Eigen::Vector3d position = first_from_imu.translation();
+  return {{"position_in_first_metres", {position.x(), position.y(), position.z()}},
+          {"rotation_degrees", Eigen::AngleAxisd(first_from_imu.linear()).angle() * degrees}};
+}
+
 void show(const CalibrationArguments& arguments) {
   const ws::Calibration calibration = ws::read_calibration(arguments.file);
   const std::vector<ws::View>& views = calibration.rig.views;
@@ -95,6 +102,7 @@ void show(const CalibrationArguments& arguments) {
       json["pairs"].push_back(describe(views[i], views[j]));
     }
   }
+  if (const auto& imu = calibration.rig.world_from_imu) json["imu"] = describe_imu(*imu);
   if (arguments.as_json) {
     std::cout << json.dump(2) << "\n";
     return;
@@ -119,6 +127,12 @@ void show(const CalibrationArguments& arguments) {
                 p["baseline_metres"].get<double>(), p["rotation_degrees"].get<double>(),
                 p["direction_in_first"][0].get<double>(), p["direction_in_first"][1].get<double>(),
                 p["direction_in_first"][2].get<double>());
+  }
+  if (json.contains("imu")) {
+    const auto& position = json["imu"]["position_in_first_metres"];
+    std::printf("  IMU in the frame of %s  %.4f %.4f %.4f m  rotation %.3f degrees\n",
+                views.front().name.c_str(), position[0].get<double>(), position[1].get<double>(),
+                position[2].get<double>(), json["imu"]["rotation_degrees"].get<double>());
   }
 }
 
