@@ -19,8 +19,8 @@
 #define SUPPORT_STEP 4
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
-// Mean squared correlation of the surroundings below which their planes are not known from the images.
-#define ENOUGH_EVIDENCE 0.1f
+// Of the surroundings' mean squared correlation: from a tenth on, their planes count as known from the images.
+#define EVIDENCE_SCALE 10.0f
 
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -110,7 +110,7 @@ FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float sp
 FN float confidence_of(float displacement, float support, float unexplained, float evidence) {
   float log_odds = 1.41f - 0.48f * logarithm(1.0f + 4.0f * displacement) + 1.44f * logarithm(support + 0.02f) -
                    0.31f * logarithm(unexplained + 1.5e-5f);
-  return min(evidence / ENOUGH_EVIDENCE, 1.0f) / (1.0f + exponential(-log_odds));
+  return min(EVIDENCE_SCALE * evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
