@@ -38,7 +38,7 @@ class ViewWriter {
 
   Json write() {
     write_maps();
-    if (!format_.no_cloud) write_cloud();
+    if (!format_.no_cloud) ws::write_ply(named("cloud", ".ply"), cloud());
     if (!format_.no_pictures) write_pictures();
     const ws::ConsistencyScores scores =
         ws::consistency_scores(result_.differences, result_.cost, textured_pixels());
@@ -82,11 +82,18 @@ class ViewWriter {
     ws::write_image(named("reasons", ".png"), result_.reasons);
   }
 
-  void write_cloud() {
-    const cv::Mat rays = ws::ray_image(view_.camera, view_.mask);
-    ws::write_ply(named("cloud", ".ply"),
-                  ws::make_point_cloud(accepted_, rays, result_.normals, contents_.images[index_],
-                                       result_.confidence, view_.world_from_camera));
+  ws::PointCloud cloud() const {
+    return ws::make_point_cloud(accepted_, ws::ray_image(view_.camera, view_.mask), result_.normals,
+                                contents_.images[index_], result_.confidence,
+                                view_.world_from_camera);
+  }
+
+  /// Behind and above the camera, in proportion to the scene, looking down a little: what is wrong
+  /// in a map leaves its surface there.
+  Eigen::Isometry3d viewpoint(const ws::ColourRange& range) const {
+    const double scale = 2 * range.nearest;
+    return view_.world_from_camera * Eigen::Translation3d(0, -0.5 * scale, -0.7 * scale) *
+           Eigen::AngleAxisd(-0.35, Eigen::Vector3d::UnitX());
   }
 
   void write_pictures() {
@@ -106,18 +113,20 @@ class ViewWriter {
     ws::write_image(named("normals_preview", ".png"), normals);
     ws::write_image(named("confidence_preview", ".png"), confidence);
     ws::write_image(named("reasons_preview", ".png"), reasons);
-    std::vector<ws::Panel> panels = {{"image", image},
-                                     {"distance", distances(result_.distance)},
-                                     {"accepted distance", accepted},
-                                     {"normals", normals},
-                                     {"confidence", confidence},
-                                     {"rejected because", reasons}};
+    std::vector<ws::Panel> panels = {
+        {"image", image},
+        {"distance", distances(result_.distance)},
+        {"accepted distance", accepted},
+        {"normals", normals},
+        {"confidence", confidence},
+        {"rejected because", reasons},
+        {"accepted points", ws::cloud_picture(cloud(), viewpoint(range), image.size())}};
     if (has_truth) {
       const ws::GroundTruth& truth = contents_.truths[index_];
       panels.push_back({"true distance", distances(truth.distance)});
       panels.push_back({"error: green 0.5 %, red 5 %", ws::error_picture(result_.distance, truth)});
     }
-    ws::write_image(named("summary", ".png"), ws::panel_sheet(panels, has_truth ? 4 : 3));
+    ws::write_image(named("summary", ".png"), ws::panel_sheet(panels, has_truth ? 3 : 4));
   }
 
   fs::path folder_;

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "widestereo/point_cloud.h"
+
 namespace widestereo {
 
 /// Distances (metres) at the two ends of a colour map.
@@ -26,6 +28,11 @@ cv::Mat normal_picture(const cv::Mat& normals);
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high);
 /// Reason bits: the colour of the first bit set, the grey image where accepted.
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
+
+/// A cloud in its own colours as a pinhole camera of 90 degrees across sees it from
+/// `world_from_viewer` (metres; x right, y down, z forward), nearest points first, 3x3 pixels each.
+cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
+                      cv::Size size);
 
 /// A picture with a legend below: the colour bar of distance_picture() with distances in metres.
 cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range);

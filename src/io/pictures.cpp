@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -155,6 +156,36 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
     picture.setTo(reason_styles[bit].colour, (reasons & (1 << bit)) != 0);
   }
   picture.setTo(reason_styles.back().colour, (reasons & (1 << (reason_styles.size() - 1))) != 0);
+  return picture;
+}
+
+cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
+                      cv::Size size) {
+  cv::Mat picture(size, CV_8UC3, no_value);
+  cv::Mat_<float> nearest(size, std::numeric_limits<float>::max());
+  const Eigen::Isometry3f viewer = world_from_viewer.inverse().cast<float>();
+  const float focal = 0.5f * static_cast<float>(size.width);
+  const Eigen::Vector2f centre(0.5f * static_cast<float>(size.width - 1),
+                               0.5f * static_cast<float>(size.height - 1));
+  for (const CloudPoint& point : cloud) {
+    const Eigen::Vector3f p = viewer * point.position;
+    if (p.z() <= 0) continue;
+    const Eigen::Vector2f pixel = centre + focal / p.z() * p.head<2>();
+    // Left out before the conversion to whole numbers, which may overflow.
+    if (pixel.minCoeff() < -1 || pixel.x() > static_cast<float>(size.width) ||
+        pixel.y() > static_cast<float>(size.height)) {
+      continue;
+    }
+    const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
+    const cv::Rect dot = cv::Rect(at.x - 1, at.y - 1, 3, 3) & cv::Rect({}, size);
+    for (int y = dot.y; y < dot.y + dot.height; ++y) {
+      for (int x = dot.x; x < dot.x + dot.width; ++x) {
+        if (p.z() >= nearest(y, x)) continue;
+        nearest(y, x) = p.z();
+        picture.at<cv::Vec3b>(y, x) = {point.blue, point.green, point.red};
+      }
+    }
+  }
   return picture;
 }
 

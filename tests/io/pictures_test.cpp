@@ -46,6 +46,26 @@ TEST(Pictures, NormalsHaveDocumentedColours) {
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(128, 255, 128));
 }
 
+TEST(Pictures, CloudsAreSeenFromTheViewpoint) {
+  const auto point = [](float x, float y, float z, std::uint8_t red) {
+    return CloudPoint{{x, y, z}, {0, 0, -1}, red, 0, 0, 1};
+  };
+  // Before, beside and behind a viewer two metres above the origin; the second hides the first.
+  const PointCloud cloud = {point(0, -2, 4, 10), point(0, -2, 2, 20), point(1, -2, 2, 30),
+                            point(0, -2, -1, 40), point(1e20f, -2, 1e-20f, 50)};
+  const Eigen::Isometry3d viewer(Eigen::Translation3d(0, -2, 0));
+  const cv::Mat picture = cloud_picture(cloud, viewer, {41, 21});
+  EXPECT_EQ(picture.at<cv::Vec3b>(10, 20), cv::Vec3b(0, 0, 20));
+  EXPECT_EQ(picture.at<cv::Vec3b>(10, 30), cv::Vec3b(0, 0, 30));
+  EXPECT_EQ(picture.at<cv::Vec3b>(9, 29), cv::Vec3b(0, 0, 30)) << "3x3 pixels";
+  EXPECT_EQ(picture.at<cv::Vec3b>(10, 25), picture.at<cv::Vec3b>(0, 0)) << "nothing is there";
+  EXPECT_EQ(cloud_picture({point(0, -2, 2, 20)},
+                          viewer * Eigen::AngleAxisd(3, Eigen::Vector3d::UnitY()), {41, 21})
+                .at<cv::Vec3b>(10, 20),
+            picture.at<cv::Vec3b>(0, 0))
+      << "it looks the other way";
+}
+
 TEST(Pictures, ReasonsCoverTheImage) {
   cv::Mat reasons = cv::Mat::zeros(2, 2, CV_16UC1);
   reasons.at<ushort>(0, 1) = reason_inconsistent | reason_tilt;
