@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <tuple>
 
 #include "device_fixture.h"
 #include "error_of.h"
@@ -20,11 +21,14 @@ using ::testing::HasSubstr;
 
 constexpr int size = 96;
 
-/// Camera 0 to world of frame `k`: a step of 15 cm and six degrees each, some pixels.
-Eigen::Isometry3d pose(int k) {
-  return Eigen::Translation3d(0.15 * k, -0.03 * k, 0.06 * k) *
-         Eigen::AngleAxisd(0.105 * k, Eigen::Vector3d(0.2, 1, 0.1).normalized());
+/// Camera 0 to world after steps of 5 cm and two degrees, about a pixel each.
+Eigen::Isometry3d pose_after(double steps) {
+  return Eigen::Translation3d(0.05 * steps, -0.01 * steps, 0.02 * steps) *
+         Eigen::AngleAxisd(0.035 * steps, Eigen::Vector3d(0.2, 1, 0.1).normalized());
 }
+
+/// Camera 0 to world of frame `k`.
+Eigen::Isometry3d pose(int k) { return pose_after(3 * k); }
 
 Eigen::Isometry3d motion_to(int k) { return pose(k).inverse() * pose(k - 1); }
 
@@ -163,15 +167,21 @@ std::vector<ViewResult> true_planes(const RenderedPair& pair) {
 }
 
 TEST(Motion, IsFoundToAFractionOfAPixel) {
-  std::vector<cv::Mat> brighter = images_of(frame(1));
-  for (cv::Mat& image : brighter) image.convertTo(image, -1, 0.8, 12);
-  for (const auto& images : {images_of(frame(1)), brighter}) {
-    const auto motion =
-        estimate_motion(frame(0).rig, images_of(frame(0)), true_planes(frame(0)), images);
-    ASSERT_TRUE(motion.has_value());
-    const Eigen::Isometry3d error = motion_to(1).inverse() * *motion;
-    EXPECT_LT(Eigen::AngleAxisd(error.linear()).angle(), 0.003);  // a pixel has 0.03
-    EXPECT_LT(error.translation().norm(), 0.005);
+  for (const auto& [steps, radians, metres] :
+       {std::tuple(1.0, 0.003, 0.005), std::tuple(3.0, 0.01, 0.01)}) {  // a pixel has 0.03 radians
+    const Eigen::Isometry3d now = pose_after(steps);
+    const std::vector<cv::Mat> same = images_of(render_demo_from(now, size));
+    std::vector<cv::Mat> brighter(same.size());
+    for (std::size_t i = 0; i < same.size(); ++i) same[i].convertTo(brighter[i], -1, 0.8, 12);
+    for (const auto& images : {same, brighter}) {
+      SCOPED_TRACE(steps);
+      const auto motion =
+          estimate_motion(frame(0).rig, images_of(frame(0)), true_planes(frame(0)), images);
+      ASSERT_TRUE(motion.has_value());
+      const Eigen::Isometry3d error = now * *motion;
+      EXPECT_LT(Eigen::AngleAxisd(error.linear()).angle(), radians);
+      EXPECT_LT(error.translation().norm(), metres);
+    }
   }
 }
 
