@@ -38,8 +38,13 @@ class ViewWriter {
 
   Json write() {
     write_maps();
-    if (!format_.no_cloud) ws::write_ply(named("cloud", ".ply"), cloud());
-    if (!format_.no_pictures) write_pictures();
+    if (!format_.no_cloud || !format_.no_pictures) {
+      const ws::PointCloud cloud = ws::make_point_cloud(
+          accepted_, ws::ray_image(view_.camera, view_.mask), result_.normals,
+          contents_.images[index_], result_.confidence, view_.world_from_camera);
+      if (!format_.no_cloud) ws::write_ply(named("cloud", ".ply"), cloud);
+      if (!format_.no_pictures) write_pictures(cloud);
+    }
     const ws::ConsistencyScores scores =
         ws::consistency_scores(result_.differences, result_.cost, textured_pixels());
     return {{"name", view_.name},
@@ -82,12 +87,6 @@ class ViewWriter {
     ws::write_image(named("reasons", ".png"), result_.reasons);
   }
 
-  ws::PointCloud cloud() const {
-    return ws::make_point_cloud(accepted_, ws::ray_image(view_.camera, view_.mask), result_.normals,
-                                contents_.images[index_], result_.confidence,
-                                view_.world_from_camera);
-  }
-
   /// Behind and above the camera, in proportion to the scene, looking down a little: what is wrong
   /// in a map leaves its surface there.
   Eigen::Isometry3d viewpoint(const ws::ColourRange& range) const {
@@ -96,7 +95,7 @@ class ViewWriter {
            Eigen::AngleAxisd(-0.35, Eigen::Vector3d::UnitX());
   }
 
-  void write_pictures() {
+  void write_pictures(const ws::PointCloud& cloud) {
     const cv::Mat& image = contents_.images[index_];
     const bool has_truth = !contents_.truths.empty();
     const ws::ColourRange range =
@@ -120,7 +119,7 @@ class ViewWriter {
         {"normals", normals},
         {"confidence", confidence},
         {"rejected because", reasons},
-        {"accepted points", ws::cloud_picture(cloud(), viewpoint(range), image.size())}};
+        {"accepted points", ws::cloud_picture(cloud, viewpoint(range), image.size())}};
     if (has_truth) {
       const ws::GroundTruth& truth = contents_.truths[index_];
       panels.push_back({"true distance", distances(truth.distance)});

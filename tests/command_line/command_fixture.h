@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -74,6 +75,20 @@ cam1:
     cv::randu(noise, 0, 255);
     cv::imwrite(file("left.png"), noise);
     cv::imwrite(file("right.png"), noise);
+  }
+
+  /// Writes imucam.yaml: calib.yaml with an IMU at (0.05, -0.04, -0.07) m in the frame of cam0,
+  /// turned by 120 degrees.
+  void write_calibration_with_imu() {
+    std::ifstream stream(folder_ / "calib.yaml");
+    std::string text(std::istreambuf_iterator<char>(stream), {});
+    text.insert(text.find("  camera_model"), R"(  T_cam_imu:
+  - [0.0, 0.0, 1.0, 0.05]
+  - [1.0, 0.0, 0.0, -0.04]
+  - [0.0, 1.0, 0.0, -0.07]
+  - [0.0, 0.0, 0.0, 1.0]
+)");
+    folder_.write("imucam.yaml", text);
   }
 
   std::string file(const std::string& name) const { return (folder_ / name).string(); }

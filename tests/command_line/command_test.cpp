@@ -200,17 +200,13 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   EXPECT_NEAR(shown["pairs"][0]["baseline_metres"].get<double>(), 0.1, 1e-12);
   EXPECT_EQ(run("calibration show " + file("calib.yaml")).exit_code, 0);
   EXPECT_FALSE(shown.contains("imu"));
-  std::ifstream stream(file("calib.yaml"));
-  std::string text(std::istreambuf_iterator<char>(stream), {});
-  text.insert(text.find("  camera_model"),
-              "  T_cam_imu: [[0, 0, 1, 0.05], [1, 0, 0, -0.04], [0, 1, 0, -0.07], [0, 0, 0, 1]]\n");
-  std::ofstream(file("imu.yaml")) << text;
-  outcome = run("calibration show " + file("imu.yaml") + " --json");
+  write_calibration_with_imu();
+  outcome = run("calibration show " + file("imucam.yaml") + " --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const nlohmann::json imu = nlohmann::json::parse(outcome.output)["imu"];
   EXPECT_EQ(imu["position_in_first_metres"], nlohmann::json({0.05, -0.04, -0.07}));
   EXPECT_NEAR(imu["rotation_degrees"].get<double>(), 120, 1e-9);
-  outcome = run("calibration show " + file("imu.yaml"));
+  outcome = run("calibration show " + file("imucam.yaml"));
   EXPECT_NE(outcome.output.find("0.0500 -0.0400 -0.0700 m"), std::string::npos) << outcome.output;
   outcome =
       run("calibration convert " + file("calib.yaml") + " " + file("calib.json") + " --to basalt");

@@ -145,15 +145,7 @@ class SequencePoses : public SequenceCommand {
  protected:
   void SetUp() override {
     SequenceCommand::SetUp();
-    std::ifstream stream(folder_ / "calib.yaml");
-    std::string text(std::istreambuf_iterator<char>(stream), {});
-    text.insert(text.find("  camera_model"), R"(  T_cam_imu:
-  - [0.0, 0.0, 1.0, 0.05]
-  - [1.0, 0.0, 0.0, -0.04]
-  - [0.0, 1.0, 0.0, -0.07]
-  - [0.0, 0.0, 0.0, 1.0]
-)");
-    folder_.write("imucam.yaml", text);
+    write_calibration_with_imu();
     Eigen::Isometry3d camera_from_imu = Eigen::Isometry3d::Identity();
     camera_from_imu.linear() << 0, 0, 1, 1, 0, 0, 0, 1, 0;
     camera_from_imu.translation() << 0.05, -0.04, -0.07;
