@@ -8,17 +8,9 @@
 #define CANDIDATE_RANDOM_DISTANCE 11
 #define CANDIDATE_SURROUNDINGS 12
 #define CANDIDATE_SOURCE_PLANE 13
-#define CANDIDATE_KINDS 14
 
 // Pixels away at which the surroundings of a pixel are taken for a normal.
 #define SURROUNDINGS_RADIUS 3
-
-FN int first_source(CONTEXT_ARGUMENT_ONLY) {
-  for (int source = 0; source < VIEW_COUNT; ++source) {
-    if ((PASS.sources & (1u << uint(source))) != 0u) return source;
-  }
-  return PASS.reference;
-}
 
 // Movement in the source, pixels per unit of inverse distance; zero where it cannot be measured.
 FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
@@ -27,8 +19,9 @@ FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   float step = 0.002f * (PARAMETERS.range.w - PARAMETERS.range.z);
   vec2 low;
   vec2 high;
-  if (!project(camera, camera.size.z, direction_in_source(pair, ray, w - step), low) ||
-      !project(camera, camera.size.z, direction_in_source(pair, ray, w + step), high)) {
+  int model = model_of(CONTEXT camera);
+  if (!project(camera, model, direction_in_source(pair, ray, w - step), low) ||
+      !project(camera, model, direction_in_source(pair, ray, w + step), high)) {
     return vec2(0.0f, 0.0f);
   }
   return (0.5f / step) * (high - low);
@@ -127,10 +120,10 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float w = inverse_distance_of(held, ray);
   if (!is_usable(CONTEXT pixel, usable_ray)) return;
   if (w <= 0.0f) held = vec4(PARAMETERS.range.z * ray, INVALID_COST);
-  int source = first_source(CONTEXT_ONLY);
+  int source = source_at(CONTEXT 0);
   float speed = length(source_velocity(CONTEXT source, ray, w));
-  for (int kind = 0; kind < CANDIDATE_KINDS; ++kind) {
-    if ((PASS.candidates & (1u << uint(kind))) == 0u) continue;
+  for (uint kinds = PASS.candidates; kinds != 0u; kinds &= kinds - 1u) {
+    int kind = lowest_bit(kinds);
     vec3 m = vec3(held.x, held.y, held.z);
     held = better_of(CONTEXT pixel, ray, held,
                      adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind),

@@ -7,7 +7,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(constant_id = 0) const int WINDOW_RADIUS = 5;
 layout(constant_id = 1) const int WARP = 0;
-layout(constant_id = 2) const int SOURCE_MODEL = -1;
+layout(constant_id = 2) const int CAMERA_MODEL = -1;
 layout(constant_id = 3) const int VIEW_COUNT = 2;
 // How intensities are read, with the same bits either way: GPUs gather four texels in one instruction,
 // software devices load texels without their texture machinery (a quarter faster on lavapipe).
@@ -15,6 +15,7 @@ layout(constant_id = 4) const bool SAMPLED = true;
 layout(constant_id = 5) const int PATTERN = 0;
 layout(constant_id = 6) const int WEIGHTED = 0;
 layout(constant_id = 7) const int FILTER = 0;
+layout(constant_id = 8) const int SOURCE_COUNT = 1;
 #define HAS_DEVICE_FILTER
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };

@@ -49,17 +49,17 @@ FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   if (w + step > PARAMETERS.range.w) step = -step;
   vec2 here;
   vec2 there;
-  if (!project(camera, camera.size.z, direction_in_source(pair, ray, w), here)) return 0.0f;
-  if (!project(camera, camera.size.z, direction_in_source(pair, ray, w + step), there)) return 0.0f;
+  int model = model_of(CONTEXT camera);
+  if (!project(camera, model, direction_in_source(pair, ray, w), here)) return 0.0f;
+  if (!project(camera, model, direction_in_source(pair, ray, w + step), there)) return 0.0f;
   return length(there - here) / abs(step);
 }
 
 // In the source where it is fastest.
 FN float speed_in_sources(CONTEXT_ARGUMENT vec3 ray, float w) {
   float speed = 0.0f;
-  for (int source = 0; source < VIEW_COUNT; ++source) {
-    if ((PASS.sources & (1u << uint(source))) == 0u) continue;
-    speed = max(speed, speed_in_source(CONTEXT source, ray, w));
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    speed = max(speed, speed_in_source(CONTEXT source_at(CONTEXT i), ray, w));
   }
   return speed;
 }
@@ -128,9 +128,8 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   } else {
     float w = dot(m, ray);
     float speed = speed_in_sources(CONTEXT ray, w);
-    for (int source = 0; source < VIEW_COUNT; ++source) {
-      if ((PASS.sources & (1u << uint(source))) == 0u) continue;
-      vec2 candidate = difference_from_source(CONTEXT source, pixel, ray, m);
+    for (int i = 0; i < SOURCE_COUNT; ++i) {
+      vec2 candidate = difference_from_source(CONTEXT source_at(CONTEXT i), pixel, ray, m);
       if (candidate.y < difference.y) difference = candidate;
     }
     vec4 limits = PARAMETERS.check_limits;

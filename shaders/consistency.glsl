@@ -23,7 +23,7 @@ FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ra
   vec3 back = rotate_back(pair, direction - w_source * translation(pair));
   vec2 reprojected;
   CameraParameters reference_camera = PARAMETERS.cameras[PASS.reference];
-  if (!project(reference_camera, reference_camera.size.z, back, reprojected)) return unknown;
+  if (!project(reference_camera, model_of(CONTEXT reference_camera), back, reprojected)) return unknown;
   return vec2(min(relative, UNKNOWN_DIFFERENCE),
               min(length(reprojected - vec2(float(pixel.x), float(pixel.y))), UNKNOWN_DIFFERENCE));
 }

@@ -34,7 +34,7 @@ struct MatchParameters {
 // Push constants.
 struct PassParameters {
   int reference;   // view whose pixels are updated
-  uint sources;    // bit j: view j is a source
+  int first_view;  // of the level: its views follow each other; all but the reference are sources
   int other;       // the one view that a transfer or a change of level reads from
   int iteration;   // counts over the whole schedule of this view
   int colour;      // 0, 1: checkerboard; -1: all pixels

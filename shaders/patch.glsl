@@ -63,7 +63,7 @@ FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2
   CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
   q = ivec2(0, 0);
-  if (!warp_ray(pair, camera, camera.size.z, m, ray, position)) return false;
+  if (!warp_ray(pair, camera, model_of(CONTEXT camera), m, ray, position)) return false;
   q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
   return in_image(camera.size, q);
 }
@@ -79,9 +79,8 @@ FN vec4 hypothesis_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
 // Whether a source may see the point, if not enough of the patch around it for a cost.
 FN bool in_some_source(CONTEXT_ARGUMENT vec3 ray, vec3 m) {
   ivec2 q;
-  for (int source = 0; source < VIEW_COUNT; ++source) {
-    if ((PASS.sources & (1u << uint(source))) == 0u) continue;
-    if (pixel_in_source(CONTEXT source, ray, m, q)) return true;
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    if (pixel_in_source(CONTEXT source_at(CONTEXT i), ray, m, q)) return true;
   }
   return false;
 }
@@ -207,7 +206,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   int reference = PASS.reference;
   ViewPair pair = PARAMETERS.pairs[reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
-  int model = SOURCE_MODEL >= 0 ? SOURCE_MODEL : camera.size.z;
+  int model = model_of(CONTEXT camera);
   if (side_of_source(pair, m) <= 0.0f) return INVALID_COST;
 
   // Sums are taken relative to the centre's intensities: single precision then suffices.
@@ -271,9 +270,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
 FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
   float best[MAX_VIEWS];
   int count = 0;
-  for (int source = 0; source < VIEW_COUNT; ++source) {
-    if ((PASS.sources & (1u << uint(source))) == 0u) continue;
-    float cost = source_cost(CONTEXT source, pixel, m);
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    float cost = source_cost(CONTEXT source_at(CONTEXT i), pixel, m);
     if (cost >= INVALID_COST) continue;
     int place = count;
     while (place > 0 && best[place - 1] > cost) {

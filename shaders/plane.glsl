@@ -2,6 +2,18 @@
 // Plane hypotheses: m = n / (n . X) in the camera frame, so that the plane is {X : m . X = 1} and the
 // inverse distance along a unit ray is w = m . ray.
 
+// The sources of the reference, i below SOURCE_COUNT. A loop over all views would cost as many patches on devices
+// that mask lanes instead of branching.
+FN int source_at(CONTEXT_ARGUMENT int i) {
+  int view = PASS.first_view + i;
+  return view < PASS.reference ? view : view + 1;
+}
+
+// A constant where all views agree, for the same reason.
+FN int model_of(CONTEXT_ARGUMENT CameraParameters camera) {
+  return CAMERA_MODEL >= 0 ? CAMERA_MODEL : camera.size.z;
+}
+
 FN vec3 plane_through(vec3 ray, float distance, vec3 normal) {
   return (1.0f / (distance * dot(normal, ray))) * normal;
 }

@@ -57,6 +57,7 @@
 #define real4 vec4
 #define uint_as_float(a) uintBitsToFloat(a)
 #define float_as_uint(a) floatBitsToUint(a)
+#define lowest_bit(a) findLSB(a)
 
 #include "elementary.glsl"
 

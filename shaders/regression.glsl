@@ -30,7 +30,7 @@
 FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 along) {
   ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
-  int model = camera.size.z;
+  int model = model_of(CONTEXT camera);
   vec2 left;
   vec2 right;
   vec2 up;
@@ -48,24 +48,25 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
          vec2(jy.y * along.x - jy.x * along.y, jx.x * along.y - jx.y * along.x);
 }
 
-// Stores the variance of the pixel's match along the epipolar curve (px^2) and the speed there (pixels per unit
-// of inverse distance): residual variance of the patch over the information of its gradients, and the square of
-// half the displacement from the source's own plane, which exposes what the patch itself cannot tell.
+// Stores all that regress_pixel() needs of a neighbour: the variance of its match along the epipolar curve (px^2), the
+// speed there (pixels per unit of inverse distance), its inverse distance and intensity. The variance is that of the
+// patch's residual over the information of its gradients, and the square of half the displacement from the
+// source's own plane, which exposes what the patch itself cannot tell.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = vec3(held.x, held.y, held.z);
   float correlation = 1.0f - held.w;
+  float centre = intensity_at(CONTEXT PASS.reference, pixel);
   float speed = 0.0f;
   float variance = UNMEASURED_VARIANCE;
   if (is_usable(CONTEXT pixel, usable_ray) && correlation > 0.05f) {
-    int source = first_source(CONTEXT_ONLY);
+    int source = source_at(CONTEXT 0);
     vec2 velocity = source_velocity(CONTEXT source, ray, dot(m, ray));
     speed = length(velocity);
     vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
     vec2 direction = reference_direction(CONTEXT source, pixel, m, along);
-    float centre = intensity_at(CONTEXT PASS.reference, pixel);
     float information = 0.0f;
     float n = 0.0f;
     float sum = 0.0f;
@@ -100,7 +101,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
                      UNMEASURED_VARIANCE);
     }
   }
-  store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, 0.0f, 0.0f));
+  store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, inverse_distance_of(held, ray), centre));
 }
 
 // Inverse distance relative to the pixel's tangent plane: offset + slope_x x + slope_y y.
@@ -118,13 +119,12 @@ struct PlaneFit {
 
 // One round of robust weighted least squares over a sparse grid of the neighbourhood; false where it is
 // degenerate.
-FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, float own_variance,
+FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
                   int round, int radius, LocalPlane guess, OUT(PlaneFit) fit) {
   fit.plane = guess;
   fit.certainty = 0.0f;
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
-  float centre = intensity_at(CONTEXT PASS.reference, pixel);
   float fall_off = 2.0f / float(radius * radius);
   int step = max(radius / 3, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
@@ -145,23 +145,21 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
       if (!in_image(size, q)) continue;
       vec4 measure = check_at(CONTEXT PASS.reference, q);
-      float a = intensity_at(CONTEXT PASS.reference, q);
-      if (measure.x >= UNMEASURED_VARIANCE || a < 0.0f) continue;
-      vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+      if (measure.x >= UNMEASURED_VARIANCE) continue;
       vec4 r = ray_at(CONTEXT PASS.reference, q);
       vec3 direction = vec3(r.x, r.y, r.z);
       float forward = dot(direction, ray);
       if (forward < 0.1f) continue;
       float x = TANGENT_SCALE * dot(direction, east) / forward;
       float y = TANGENT_SCALE * dot(direction, south) / forward;
-      float w = inverse_distance_of(plane, direction) / forward;
+      float w = measure.z / forward;
       float residual = (w - guess.offset - guess.slope_x * x - guess.slope_y * y) * measure.y;
       // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own.
-      float scale2 = 2.0f * min(measure.x + own_variance, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      float scale2 = 2.0f * min(measure.x + own.x, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
       float doubt = 1.0f + residual * residual / scale2;
       float weight = measure.y * measure.y /
                      (measure.x * doubt * doubt * growth(float(dx * dx + dy * dy) * fall_off) *
-                      growth(abs(a - centre) * PARAMETERS.support.y));
+                      growth(abs(measure.w - own.w) * PARAMETERS.support.y));
       s += weight;
       sx += weight * x;
       sy += weight * y;
@@ -208,7 +206,7 @@ FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 so
     if (determined && round < REGRESSION_ROUNDS - 1) continue;
     int radius = max(PASS.steps >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
     PlaneFit fit;
-    if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, radius, plane, fit)) continue;
+    if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
     plane = fit.plane;
     found = true;
     if (!determined) offset = plane.offset;
@@ -229,7 +227,7 @@ FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 s
   for (int round = 0; round < NORMAL_ROUNDS; ++round) {
     int radius = round == 0 ? PASS.steps / 8 : (round < NORMAL_ROUNDS - 1 ? PASS.steps / 2 : PASS.steps);
     PlaneFit fit;
-    if (!fit_plane(CONTEXT pixel, ray, east, south, own.x, round, max(radius, 2), plane, fit)) continue;
+    if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, max(radius, 2), plane, fit)) continue;
     if (!found) first = fit;
     float x = fit.plane.slope_x - first.plane.slope_x;
     float y = fit.plane.slope_y - first.plane.slope_y;
@@ -269,14 +267,23 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_prior(CONTEXT PASS.reference, pixel, prior);
 }
 
-// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN the cost stays,
-// for another regression to follow that needs none.
+// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN the cost stays
+// and the measure follows, for another regression that needs no new one.
 FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
   if (prior.w == 0.0f) return;
   vec3 m = vec3(prior.x, prior.y, prior.z);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
   float cost = held.w;
-  if ((PASS.candidates & ADOPT_UNSEEN) == 0u) cost = patch_cost(CONTEXT pixel, m);
-  if (cost < INVALID_COST) store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
+  bool unseen = (PASS.candidates & ADOPT_UNSEEN) != 0u;
+  if (!unseen) cost = patch_cost(CONTEXT pixel, m);
+  if (cost >= INVALID_COST) return;
+  vec4 adopted = vec4(m, cost);
+  store_hypothesis(CONTEXT PASS.reference, pixel, adopted);
+  if (unseen) {
+    vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+    vec4 measure = check_at(CONTEXT PASS.reference, pixel);
+    measure.z = inverse_distance_of(adopted, vec3(ray.x, ray.y, ray.z));
+    store_check(CONTEXT PASS.reference, pixel, measure);
+  }
 }

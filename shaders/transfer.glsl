@@ -21,7 +21,7 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
   vec2 position;
   if (side_of_source(pair, m) <= 0.0f) return false;
-  if (!warp_ray(pair, camera, camera.size.z, m, unit_ray, position)) return false;
+  if (!warp_ray(pair, camera, model_of(CONTEXT camera), m, unit_ray, position)) return false;
   if (!(position.x > -1.0f && position.y > -1.0f && position.x < float(camera.size.x) &&
         position.y < float(camera.size.y))) {
     return false;

@@ -87,5 +87,13 @@ FN uint float_as_uint(float a) {
   memcpy(&u, &a, sizeof u);
   return u;
 }
+// Number of the lowest bit that is set; `a` is not zero.
+FN int lowest_bit(uint a) {
+#ifdef __CUDA_ARCH__
+  return __ffs(static_cast<int>(a)) - 1;
+#else
+  return __builtin_ctz(a);
+#endif
+}
 
 #include "elementary.glsl"

@@ -38,8 +38,8 @@ struct Context {
 
 #define WINDOW_RADIUS context.constants.window_radius
 #define WARP context.constants.warp
-#define SOURCE_MODEL context.constants.source_model
-#define VIEW_COUNT context.constants.view_count
+#define CAMERA_MODEL context.constants.camera_model
+#define SOURCE_COUNT context.constants.source_count
 #define PATTERN context.constants.pattern
 #define WEIGHTED context.constants.weighted
 #define FILTER FILTER_EXACT

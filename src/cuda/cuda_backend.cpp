@@ -67,12 +67,13 @@ CudaBackend::CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
   check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "make a stream");
   stream_.reset(stream);
   make_maps();
+  context_.camera_model = constants.camera_model;
   context_.window_radius = constants.window_radius;
   context_.warp = constants.warp;
   context_.pattern = constants.pattern;
   context_.weighted = constants.weighted;
   context_.filter = constants.filter;
-  context_.view_count = constants.view_count;
+  context_.source_count = constants.source_count;
   // The maps were cleared on the default stream, which the others do not wait for.
   check(cudaDeviceSynchronize(), "clear the maps");
 }

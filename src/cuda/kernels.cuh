@@ -19,7 +19,7 @@ struct Constants {
   static constexpr int pattern = Pattern;
   static constexpr int weighted = Weighted;
   static constexpr int filter = Filter;
-  static constexpr int source_model = Model;
+  static constexpr int camera_model = Model;
   /// On the checkerboard rows start in turn one column later: two are the same for all turns.
   static constexpr int unrolled_rows =
       Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
@@ -31,8 +31,8 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 #define PATTERN (C::pattern >= 0 ? C::pattern : context.pattern)
 #define WEIGHTED (C::weighted >= 0 ? C::weighted : context.weighted)
 #define FILTER (C::filter >= 0 ? C::filter : context.filter)
-#define SOURCE_MODEL C::source_model
-#define VIEW_COUNT context.view_count
+#define CAMERA_MODEL (C::camera_model >= 0 ? C::camera_model : context.camera_model)
+#define SOURCE_COUNT context.source_count
 #define HAS_DEVICE_FILTER
 #undef PARAMETERS
 #define PARAMETERS (*context.parameters)
@@ -173,11 +173,11 @@ KernelTable table_of(const KernelEntry (&entries)[count]) {
   return {entries, count};
 }
 
-/// Calls `get`, a callable over a Constants tag, with those of a source model.
+/// Calls `get`, a callable over a Constants tag, with those of a camera model.
 template <int Radius, int Warp, int Pattern, int Weighted, class Get>
-KernelTable for_model(int source_model, Get get) {
+KernelTable for_model(int camera_model, Get get) {
   constexpr int Filter = FILTER_DEVICE;
-  switch (source_model) {
+  switch (camera_model) {
     case CAMERA_KANNALA_BRANDT:
       return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_KANNALA_BRANDT>());
     case CAMERA_DOUBLE_SPHERE:

@@ -33,8 +33,8 @@ struct Context {
   ViewMemory views[MAX_VIEWS];
   uint* transfer_nearest;  ///< of the reference view
   uint* transfer_winner;
-  int window_radius, warp, pattern, weighted, filter;
-  int view_count;
+  int camera_model, window_radius, warp, pattern, weighted, filter;
+  int source_count;
 };
 static_assert(sizeof(Context) <= 4096);
 
@@ -57,11 +57,11 @@ KernelTable generic_kernels();
 /// The kernels that take most of the time, with filtering by the texture units, compiled for the
 /// window and the constants of a preset: `paper` (exact warp, dense), the same with the affine
 /// warp, `fast` (affine, checkerboard, weighted) or `quality` (affine, dense, weighted).
-/// `source_model`: a camera model that has kernels of its own (kannala_brandt, double_sphere),
+/// `camera_model`: a camera model that has kernels of its own (kannala_brandt, double_sphere),
 /// anything else selects those for all models.
-KernelTable paper_kernels(int source_model);
-KernelTable affine_paper_kernels(int source_model);
-KernelTable fast_kernels(int source_model);
-KernelTable quality_kernels(int source_model);
+KernelTable paper_kernels(int camera_model);
+KernelTable affine_paper_kernels(int camera_model);
+KernelTable fast_kernels(int camera_model);
+KernelTable quality_kernels(int camera_model);
 
 }  // namespace widestereo::kernel::cuda

@@ -2,8 +2,8 @@
 #include "cuda/kernels.cuh"
 
 namespace widestereo::kernel::cuda {
-KernelTable fast_kernels(int source_model) {
-  return for_model<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 1>(source_model,
+KernelTable fast_kernels(int camera_model) {
+  return for_model<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 1>(camera_model,
                                                                                 PyramidKernels());
 }
 

@@ -14,11 +14,11 @@ struct Get {
 
 }  // namespace
 
-KernelTable paper_kernels(int source_model) {
-  return for_model<paper_window_radius, WARP_EXACT, 0, 0>(source_model, Get());
+KernelTable paper_kernels(int camera_model) {
+  return for_model<paper_window_radius, WARP_EXACT, 0, 0>(camera_model, Get());
 }
-KernelTable affine_paper_kernels(int source_model) {
-  return for_model<paper_window_radius, WARP_AFFINE, 0, 0>(source_model, Get());
+KernelTable affine_paper_kernels(int camera_model) {
+  return for_model<paper_window_radius, WARP_AFFINE, 0, 0>(camera_model, Get());
 }
 
 }  // namespace widestereo::kernel::cuda

@@ -2,8 +2,8 @@
 #include "cuda/kernels.cuh"
 
 namespace widestereo::kernel::cuda {
-KernelTable quality_kernels(int source_model) {
-  return for_model<pyramid_window_radius, WARP_AFFINE, 0, 1>(source_model, PyramidKernels());
+KernelTable quality_kernels(int camera_model) {
+  return for_model<pyramid_window_radius, WARP_AFFINE, 0, 1>(camera_model, PyramidKernels());
 }
 
 }  // namespace widestereo::kernel::cuda

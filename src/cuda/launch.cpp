@@ -24,13 +24,13 @@ KernelTable specialised_kernels(const KernelConstants& c) {
            (c.weighted != 0) == weighted;
   };
   if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense, false))
-    return paper_kernels(c.source_model);
+    return paper_kernels(c.camera_model);
   if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, false))
-    return affine_paper_kernels(c.source_model);
+    return affine_paper_kernels(c.camera_model);
   if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
-    return fast_kernels(c.source_model);
+    return fast_kernels(c.camera_model);
   if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::dense, true))
-    return quality_kernels(c.source_model);
+    return quality_kernels(c.camera_model);
   return {nullptr, 0};
 }
 

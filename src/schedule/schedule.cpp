@@ -115,10 +115,11 @@ class Builder {
                     " levels: the coarsest would be less than 2 pixels wide; choose fewer levels.");
       }
     }
-    schedule_.constants = {.source_model = common_model(),
+    schedule_.constants = {.camera_model = common_model(),
                            .window_radius = options.window_radius,
                            .warp = static_cast<int>(options.warp),
                            .view_count = static_cast<int>(schedule_.views.size()),
+                           .source_count = views_of_rig_ - 1,
                            .pattern = static_cast<int>(options.pattern),
                            .weighted = options.weight_scale > 0 ? 1 : 0,
                            .filter = static_cast<int>(options.filter)};
@@ -205,10 +206,9 @@ class Builder {
   }
 
   kernel::PassParameters pass_of(int view) const {
-    const unsigned of_level = ((1u << views_of_rig_) - 1) << (view / views_of_rig_ * views_of_rig_);
     kernel::PassParameters pass{};
     pass.reference = view;
-    pass.sources = of_level & ~(1u << view);
+    pass.first_view = view / views_of_rig_ * views_of_rig_;
     pass.other = view;
     pass.iteration = 0;
     pass.colour = -1;

@@ -38,10 +38,11 @@ const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).
 struct KernelConstants {
-  int source_model = -1;  ///< the sources' camera model when all agree, else -1
+  int camera_model = -1;  ///< of all views when they agree, else -1
   int window_radius = 5;
   int warp = 0;
   int view_count = 2;  ///< at all levels
+  int source_count = 1;
   int pattern = 0;
   int weighted = 0;
   int filter = 0;

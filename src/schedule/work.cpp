@@ -2,7 +2,6 @@
 #include "schedule/work.h"
 
 #include <array>
-#include <bit>
 
 namespace widestereo {
 namespace {
@@ -83,7 +82,6 @@ struct Traffic {
 Traffic traffic_of(const Dispatch& dispatch) {
   constexpr unsigned seen = ray | intensity;
   const bool patches = dispatch.samples > 0;
-  const unsigned of_patches = patches ? seen : 0;
   const unsigned in_sources = patches ? static_cast<unsigned>(intensity) : 0;
   switch (dispatch.kernel) {
     case Kernel::initialise:
@@ -115,7 +113,8 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::regress:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:
-      return {prior | plane | of_patches, in_sources, plane};
+      if (!patches) return {prior | plane | ray | checks, 0, plane | checks};
+      return {prior | plane | seen, intensity, plane};
     case Kernel::fill:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt_fill:
@@ -134,7 +133,7 @@ PatchOperations patch_operations(const KernelConstants& c) {
   const bool exact = c.warp == static_cast<int>(PatchWarp::exact);
   const bool quadratic = c.warp == static_cast<int>(PatchWarp::quadratic);
   const int weighting = c.weighted != 0 ? weight_of_sample : 0;
-  const int warp_ray = warp_ray_before_projection + projection(c.source_model);
+  const int warp_ray = warp_ray_before_projection + projection(c.camera_model);
   const int map_offset = quadratic ? map_offset_quadratic : map_offset_affine;
   // Two differences from the centre, two sums of weights, five of intensities and their products.
   const int sums = 2 + 2 + 8 + (c.weighted != 0 ? 2 : 0);
@@ -160,7 +159,7 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
                     samples_of_patch(schedule.constants.window_radius, schedule.constants.pattern));
   const double pixels = static_cast<double>(dispatch.width) * dispatch.height;
   const Traffic traffic = traffic_of(dispatch);
-  const int sources = std::popcount(dispatch.pass.sources);
+  const int sources = schedule.constants.source_count;
   return {.samples = samples,
           .operations = samples * operations.of_sample + patches * operations.of_patch,
           .texels = 4 * samples,

@@ -14,15 +14,16 @@ struct Specialisation {
   VkBool32 sampled = VK_TRUE;
 };
 
-constexpr std::array<VkSpecializationMapEntry, 8> specialisation_entries = {{
+constexpr std::array<VkSpecializationMapEntry, 9> specialisation_entries = {{
     {0, offsetof(Specialisation, constants.window_radius), sizeof(int)},
     {1, offsetof(Specialisation, constants.warp), sizeof(int)},
-    {2, offsetof(Specialisation, constants.source_model), sizeof(int)},
+    {2, offsetof(Specialisation, constants.camera_model), sizeof(int)},
     {3, offsetof(Specialisation, constants.view_count), sizeof(int)},
     {4, offsetof(Specialisation, sampled), sizeof(VkBool32)},
     {5, offsetof(Specialisation, constants.pattern), sizeof(int)},
     {6, offsetof(Specialisation, constants.weighted), sizeof(int)},
     {7, offsetof(Specialisation, constants.filter), sizeof(int)},
+    {8, offsetof(Specialisation, constants.source_count), sizeof(int)},
 }};
 
 Handle<VkShaderModule> make_module(const VulkanContext& context, const std::string& name) {

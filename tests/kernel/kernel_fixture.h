@@ -85,7 +85,7 @@ class KernelFixture {
   /// Makes `view` the reference and every other view a source.
   void set_reference(int view) {
     pass_.reference = view;
-    pass_.sources = ((1u << views_.size()) - 1) & ~(1u << view);
+    pass_.first_view = 0;
   }
 
  private:

@@ -15,6 +15,7 @@ using kernel::vec3;
 constexpr int size = 96;
 /// Movement in the source, pixels per unit of inverse distance.
 constexpr double speed = 3;
+constexpr float grey = 0.5f;
 
 Options options() {
   Options options = Options::preset_named("fast");
@@ -33,7 +34,7 @@ class Regression : public ::testing::Test {
   using Truth = std::function<Eigen::Vector3d(int x)>;
 
   Regression() : fixture_(fisheye_rig(size), options()) {
-    fixture_.view(0).image().setTo(0.5);
+    fixture_.view(0).image().setTo(grey);
     fixture_.set_reference(0);
   }
 
@@ -56,9 +57,11 @@ class Regression : public ::testing::Test {
         fixture_.view(0).hypotheses(y, x) =
             cv::Vec4f(static_cast<float>(held.x()), static_cast<float>(held.y()),
                       static_cast<float>(held.z()), 0.1f);
+        fixture_.view(0).checks(y, x) =
+            cv::Vec4f(static_cast<float>(noise * noise), static_cast<float>(speed),
+                      static_cast<float>(held.dot(r)), grey);
       }
     }
-    fixture_.view(0).checks.setTo(cv::Scalar(noise * noise, speed, 0, 0));
   }
 
   /// m of the regressed plane; zero where there is none.

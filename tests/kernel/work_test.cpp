@@ -48,7 +48,7 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
           options.pattern = pattern;
           options.window_radius = 3;
           const counting::Counts run = run_patch(options, static_cast<CameraModel>(model));
-          const KernelConstants constants{.source_model = model,
+          const KernelConstants constants{.camera_model = model,
                                           .window_radius = 3,
                                           .warp = static_cast<int>(warp),
                                           .pattern = static_cast<int>(pattern),
