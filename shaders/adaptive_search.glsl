@@ -27,6 +27,27 @@ FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   return (0.5f / step) * (high - low);
 }
 
+// The source that tells most about the pixel's distance, and the movement there: of those that see the point the
+// one in which it is fastest.
+FN int telling_source(CONTEXT_ARGUMENT vec3 ray, float w, OUT(vec2) velocity) {
+  int chosen = source_at(CONTEXT 0);
+  velocity = source_velocity(CONTEXT chosen, ray, w);
+  if (SOURCE_COUNT == 1) return chosen;
+  ivec2 q;
+  bool seen = pixel_in_source(CONTEXT chosen, ray, w * ray, q);
+  for (int i = 1; i < SOURCE_COUNT; ++i) {
+    int source = source_at(CONTEXT i);
+    vec2 v = source_velocity(CONTEXT source, ray, w);
+    bool sees = pixel_in_source(CONTEXT source, ray, w * ray, q);
+    bool tells_more = sees == seen ? length(v) > length(velocity) : sees;
+    if (!tells_more) continue;
+    chosen = source;
+    velocity = v;
+    seen = sees;
+  }
+  return chosen;
+}
+
 // The plane of lowest cost on a strip: 7 near pixels in a V, or 11 far ones along a line up to 23 pixels
 // away, up, down, left or right. All are of the other colour, so that no thread reads what another writes.
 FN vec3 best_of_strip(CONTEXT_ARGUMENT ivec2 pixel, int strip) {
@@ -120,8 +141,9 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float w = inverse_distance_of(held, ray);
   if (!is_usable(CONTEXT pixel, usable_ray)) return;
   if (w <= 0.0f) held = vec4(PARAMETERS.range.z * ray, INVALID_COST);
-  int source = source_at(CONTEXT 0);
-  float speed = length(source_velocity(CONTEXT source, ray, w));
+  vec2 velocity;
+  int source = telling_source(CONTEXT ray, w, velocity);
+  float speed = length(velocity);
   for (uint kinds = PASS.candidates; kinds != 0u; kinds &= kinds - 1u) {
     int kind = lowest_bit(kinds);
     vec3 m = vec3(held.x, held.y, held.z);

@@ -62,8 +62,8 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float speed = 0.0f;
   float variance = UNMEASURED_VARIANCE;
   if (is_usable(CONTEXT pixel, usable_ray) && correlation > 0.05f) {
-    int source = source_at(CONTEXT 0);
-    vec2 velocity = source_velocity(CONTEXT source, ray, dot(m, ray));
+    vec2 velocity;
+    int source = telling_source(CONTEXT ray, dot(m, ray), velocity);
     speed = length(velocity);
     vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
     vec2 direction = reference_direction(CONTEXT source, pixel, m, along);

@@ -330,6 +330,31 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
   expect_no_validation_messages(*device);
 }
 
+/// A source a centimetre away, which tells next to nothing about distances, comes before the one
+/// that does.
+TEST_P(EveryDevice, BelievesTheSourceThatTellsMost) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const RenderedPair pair = render_demo(128);
+  const Eigen::Isometry3d step(Eigen::Translation3d(0.01, 0, 0));
+  const RenderedPair moved = render_demo_from(step, 128);
+  Rig rig{.views = {pair.rig.views[0], pair.rig.views[0], pair.rig.views[1]}};
+  rig.views[1].name = "near";
+  rig.views[1].world_from_camera = step * rig.views[1].world_from_camera;
+  Options fast = Options::preset_named("fast");
+  std::tie(fast.min_distance, fast.max_distance) = demo_distance_range();
+  fast.best_sources = 2;
+  const auto median_error = [&](const Rig& of, const std::vector<cv::Mat>& images) {
+    const StereoResult result = Matcher(*device, of, fast).match(images);
+    return evaluate(result.views[0].distance, {}, pair.views[0].truth, rig.views[0],
+                    rig.views[2])[1]
+        .median_relative;
+  };
+  const double of_pair = median_error(pair.rig, images_of(pair));
+  EXPECT_LT(median_error(rig, {pair.views[0].image, moved.views[0].image, pair.views[1].image}),
+            1.1 * of_pair);
+  expect_no_validation_messages(*device);
+}
+
 INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan", "cuda"),
                          [](const auto& test) { return std::string(test.param); });
 
