@@ -13,6 +13,7 @@
 #include "commands.h"
 #include "match_settings.h"
 #include "matching_run.h"
+#include "pose_settings.h"
 #include "progress_bar.h"
 #include "result_folder.h"
 #include "rig_settings.h"
@@ -28,15 +29,10 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr const char* of_camera = "camera";
-constexpr const char* of_imu = "imu";
-
 struct SequenceArguments {
   std::string dataset;
   std::string output;
-  std::string poses;
-  std::string poses_of;           // camera or imu; empty: as the file's layout says
-  double poses_tolerance = 0.01;  // seconds
+  PoseSettings poses;
   int first = 0;
   int count = 0;  // 0 = all
   int step = 1;
@@ -55,8 +51,7 @@ struct SequenceArguments {
 struct Selection {
   std::vector<ws::SequenceFrame> frames;
   ws::Rig rig;
-  std::vector<Eigen::Isometry3d> poses;
-  std::string poses_of;  // camera, imu or, without poses, empty
+  RigPoses motion;  ///< no poses where they are not known
   std::vector<std::string> names() const {
     std::vector<std::string> names;
     for (const ws::SequenceFrame& frame : frames) names.push_back(frame.name);
@@ -68,22 +63,6 @@ std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
   std::vector<cv::Mat> images;
   for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
   return images;
-}
-
-/// Reads --poses as poses of the rig, whichever of --poses-of they are of.
-std::vector<ws::StampedPose> read_poses(const SequenceArguments& a, Selection& selection) {
-  ws::Trajectory trajectory = ws::read_trajectory(a.poses);
-  selection.poses_of = a.poses_of;
-  if (a.poses_of.empty()) {
-    selection.poses_of = trajectory.body == ws::Body::imu ? of_imu : of_camera;
-  }
-  if (selection.poses_of == of_camera) return trajectory.poses;
-  if (!selection.rig.world_from_imu) {
-    throw ws::Error(a.poses + " holds poses of the IMU, but " + a.rig.calibration +
-                    " does not say where that is; add its T_cam_imu (Kalibr) or T_imu_cam "
-                    "(Basalt), or give --poses-of camera if they are of camera 0.");
-  }
-  return ws::poses_of_camera(std::move(trajectory.poses), *selection.rig.world_from_imu);
 }
 
 Selection select_frames(const SequenceArguments& a) {
@@ -105,9 +84,8 @@ Selection select_frames(const SequenceArguments& a) {
   }
   selection.rig =
       a.rig.rig_for_images(cameras.size(), read_images(selection.frames.front()).front().size());
-  if (!a.poses.empty()) {
-    selection.poses =
-        ws::poses_of_frames(frames, chosen, read_poses(a, selection), a.poses_tolerance, a.poses);
+  if (a.poses.given()) {
+    selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames, chosen);
   }
   return selection;
 }
@@ -155,9 +133,9 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"dataset", absolute(a.dataset)},
                    {"calibration", absolute(a.rig.calibration)},
                    {"masks", a.rig.masks},
-                   {"poses", absolute(a.poses)},
-                   {"poses_of", selection.poses_of},
-                   {"poses_tolerance", a.poses_tolerance},
+                   {"poses", absolute(a.poses.file)},
+                   {"poses_of", selection.motion.of},
+                   {"poses_tolerance", a.poses.tolerance},
                    {"first", a.first},
                    {"step", a.step},
                    {"warm_start", !a.no_warm_start},
@@ -169,7 +147,7 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"pictures", !a.format.no_pictures},
                    {"device", device.name},
                    {"options", Json::parse(ws::to_json(options))}};
-  if (selection.poses_of == of_imu) {
+  if (selection.motion.of == PoseSettings::imu) {
     settings["world_from_imu"] = to_json(*selection.rig.world_from_imu);
   }
   for (const ws::View& view : selection.rig.views) settings["views"].push_back(to_json(view));
@@ -284,9 +262,10 @@ class SequenceRun {
     }
     if (arguments_.no_motion) {
       frame.motion = "none";
-    } else if (!selection_.poses.empty()) {
+    } else if (arguments_.poses.given()) {
+      const std::vector<Eigen::Isometry3d>& poses = selection_.motion.poses;
       frame.motion = "poses";
-      start.now_from_previous = selection_.poses[index].inverse() * selection_.poses[index - 1];
+      start.now_from_previous = poses[index].inverse() * poses[index - 1];
     } else {
       const auto begin = std::chrono::steady_clock::now();
       start.now_from_previous =
@@ -411,25 +390,7 @@ void add_sequence_command(CLI::App& app) {
   command->add_flag("--skip-incomplete", a->skip_incomplete, "Leave out frames that a camera lacks")
       ->group(frames);
   const std::string start = "Warm start";
-  command
-      ->add_option("--poses", a->poses,
-                   "TUM trajectory of camera 0 of the calibration, or ground truth of EuRoC or TUM "
-                   "VI (data.csv, of the IMU), to world; without it the motion is estimated from "
-                   "the images")
-      ->group(start);
-  command
-      ->add_option("--poses-of", a->poses_of,
-                   "What the poses are of: camera (0 of the calibration) or imu (the calibration "
-                   "has T_cam_imu or T_imu_cam); by default as the file's layout says")
-      ->check(CLI::IsMember({of_camera, of_imu}))
-      ->needs("--poses")
-      ->group(start);
-  command
-      ->add_option("--poses-tolerance", a->poses_tolerance,
-                   "Largest difference of time between frame and pose, seconds")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str()
-      ->group(start);
+  a->poses.add_to(*command, "without it the motion is estimated from the images", start);
   command->add_flag("--no-motion", a->no_motion, "Start where the planes were: no motion")
       ->group(start);
   command->add_flag("--no-warm-start", a->no_warm_start, "Match every frame by itself")

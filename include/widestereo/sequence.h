@@ -17,12 +17,16 @@ struct SequenceFrame {
   std::optional<std::int64_t> nanoseconds;    ///< time stamp, where the data set has them
 };
 
+/// Nanoseconds since 1970 that the last number in a file's name without extension stands for, by
+/// its digits (before a point): seconds (10), milliseconds (13), microseconds (16) or nanoseconds
+/// (19). Nothing for other numbers, nor for counters, which start with 0.
+std::optional<std::int64_t> time_in_name(const std::string& name);
+
 /// Frames of a data set in the order of time, for these cameras. Layouts: FOLDER/camN/ with images,
 /// frames being those of equal names, in numerical (or alphabetical) order; or EuRoC and TUM VI:
 /// FOLDER[/mav0]/camN/data/ with camN/data.csv (`#timestamp [ns],filename`), frames being those of
-/// equal times. Images named by 16 digits or more are taken to be named by nanoseconds. Throws
-/// Error for missing folders, no images, or a frame that some camera lacks unless those are to be
-/// skipped.
+/// equal times. Without that list frames have the time in their names. Throws Error for missing
+/// folders, no images, or a frame that some camera lacks unless those are to be skipped.
 std::vector<SequenceFrame> read_sequence(const std::filesystem::path& folder,
                                          const std::vector<int>& cameras,
                                          bool skip_incomplete = false);

@@ -14,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t digits_of_nanoseconds = 16;
-
 bool is_image(const fs::path& path) {
   static constexpr std::array<const char*, 9> extensions = {
       ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"};
@@ -45,15 +43,20 @@ struct InOrder {
   }
 };
 
-/// Images of one camera by what frames are matched by: names, or nanoseconds.
-using Images = std::map<std::string, fs::path, InOrder>;
+/// Images of one camera by what frames are matched by: names, or nanoseconds where a list gives
+/// them.
+struct Images {
+  std::map<std::string, fs::path, InOrder> of_frames;
+  bool listed = false;
+};
 
 Images images_in(const fs::path& folder) {
   Images images;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (entry.is_regular_file(error) && is_image(entry.path())) {
-      const auto [place, is_new] = images.emplace(entry.path().stem().string(), entry.path());
+      const auto [place, is_new] =
+          images.of_frames.emplace(entry.path().stem().string(), entry.path());
       if (!is_new) {
         throw Error("The frame " + place->first + " has two images, " + place->second.string() +
                     " and " + entry.path().filename().string() + "; leave one.");
@@ -62,7 +65,7 @@ Images images_in(const fs::path& folder) {
   }
   if (error)
     throw Error("Cannot read the folder " + folder.string() + ": " + error.message() + ".");
-  if (images.empty()) {
+  if (images.of_frames.empty()) {
     throw Error("There are no images in " + folder.string() + "; check the path.");
   }
   return images;
@@ -70,7 +73,7 @@ Images images_in(const fs::path& folder) {
 
 Images images_listed_in(const fs::path& list) {
   std::ifstream file(list);
-  Images images;
+  Images images{.of_frames = {}, .listed = true};
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
@@ -83,9 +86,9 @@ Images images_listed_in(const fs::path& list) {
       throw Error(list.string() + " line " + std::to_string(number) +
                   " is no \"nanoseconds,filename\".");
     }
-    images.emplace(time, list.parent_path() / "data" / line.substr(start));
+    images.of_frames.emplace(time, list.parent_path() / "data" / line.substr(start));
   }
-  if (images.empty()) throw Error(list.string() + " lists no images.");
+  if (images.of_frames.empty()) throw Error(list.string() + " lists no images.");
   return images;
 }
 
@@ -102,15 +105,41 @@ Images images_of(const fs::path& folder, int camera) {
               "...");
 }
 
-std::optional<std::int64_t> nanoseconds_of(const std::string& name) {
-  if (!is_number(name) || name.size() < digits_of_nanoseconds) return std::nullopt;
+/// Of digits alone.
+std::optional<std::int64_t> whole_number(const std::string& digits) {
   std::int64_t value = 0;
-  const auto result = std::from_chars(name.data(), name.data() + name.size(), value);
-  if (result.ec != std::errc()) return std::nullopt;
+  const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (!is_number(digits) || result.ec != std::errc()) return std::nullopt;
   return value;
 }
 
 }  // namespace
+
+std::optional<std::int64_t> time_in_name(const std::string& name) {
+  constexpr const char* digits = "0123456789";
+  const auto start_of_digits = [&](std::size_t end) {
+    const std::size_t before =
+        end == 0 ? std::string::npos : name.find_last_not_of(digits, end - 1);
+    return before == std::string::npos ? std::size_t{0} : before + 1;
+  };
+  std::size_t end = name.size();
+  std::size_t start = start_of_digits(end);
+  std::string fraction;
+  if (start > 0 && start < end && name[start - 1] == '.') {
+    fraction = name.substr(start);
+    end = start - 1;
+    start = start_of_digits(end);
+  }
+  const std::string whole = name.substr(start, end - start);
+  constexpr std::size_t digits_of_seconds = 10, digits_of_nanoseconds = 19;
+  if (whole.size() < digits_of_seconds || whole.size() > digits_of_nanoseconds ||
+      whole.front() == '0' || (whole.size() - digits_of_seconds) % 3 != 0) {
+    return std::nullopt;
+  }
+  std::string nanoseconds = whole + fraction;
+  nanoseconds.resize(digits_of_nanoseconds, '0');
+  return whole_number(nanoseconds);
+}
 
 std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
                                          bool skip_incomplete) {
@@ -121,20 +150,22 @@ std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vect
   for (const int camera : cameras) images.push_back(images_of(folder, camera));
   std::map<std::string, int, InOrder> counts;
   for (const Images& of_camera : images) {
-    for (const auto& [key, path] : of_camera) ++counts[key];
+    for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
   }
+  const bool have_times = std::any_of(images.begin(), images.end(),
+                                      [](const Images& of_camera) { return of_camera.listed; });
   std::vector<SequenceFrame> frames;
   for (const auto& [key, count] : counts) {
     SequenceFrame frame;
-    frame.nanoseconds = nanoseconds_of(key);
+    frame.nanoseconds = have_times ? whole_number(key) : time_in_name(key);
     for (std::size_t i = 0; i < cameras.size(); ++i) {
-      const auto found = images[i].find(key);
-      if (found != images[i].end()) {
+      const auto found = images[i].of_frames.find(key);
+      if (found != images[i].of_frames.end()) {
         frame.images.push_back(found->second);
       } else if (!skip_incomplete) {
         throw Error("The frame " + key + " has no image of cam" + std::to_string(cameras[i]) +
-                    " in " + folder.string() + " (" + std::to_string(images[i].size()) + " of " +
-                    std::to_string(counts.size()) +
+                    " in " + folder.string() + " (" + std::to_string(images[i].of_frames.size()) +
+                    " of " + std::to_string(counts.size()) +
                     " frames have one); add it, or leave such frames out (--skip-incomplete).");
       }
     }

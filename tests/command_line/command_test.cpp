@@ -70,6 +70,56 @@ TEST_F(Command, DepthScoresTexturedPixels) {
   EXPECT_LT(view["cost_below_0.2"], view["cost_below_0.2_textured"]) << "the wall has no low cost";
 }
 
+/// The pair of calib.yaml, taken by its first camera alone in two places.
+class MovingCamera : public Command {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    std::ifstream stream(folder_ / "calib.yaml");
+    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    folder_.write("mono.yaml", text.substr(0, text.find("cam1:")));
+  }
+  std::string depth_at(const std::string& poses, const std::string& output) {
+    folder_.write("poses.txt", poses);
+    return "depth " + file("left.png") + " " + file("right.png") + " -c " + file("mono.yaml") +
+           " --poses " + file("poses.txt") + " -o " + file(output) + quick + "--max-theta 90 ";
+  }
+  cv::Mat distance_in(const std::string& output) const {
+    return cv::imread(file(output + "/distance0.tiff"), cv::IMREAD_UNCHANGED);
+  }
+};
+
+TEST_F(MovingCamera, WithKnownPosesIsARig) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png") + "--max-theta 90").exit_code, 0);
+  const Outcome moved = run(depth_at("0 0 0 0 0 0 0 1\n1 0.1 0 0 0 0 0 1\n", "moved"));
+  ASSERT_EQ(moved.exit_code, 0) << moved.output;
+  ASSERT_FALSE(distance_in("out").empty());
+  EXPECT_EQ(cv::norm(distance_in("moved"), distance_in("out"), cv::NORM_INF), 0);
+
+  // A quarter turn about z, far from the world's origin.
+  const Outcome far =
+      run(depth_at("0 500000 -7e6 3 0 0 0.70710678118654752 0.70710678118654752\n"
+                   "1 500000 -6999999.9 3 0 0 0.70710678118654752 0.70710678118654752\n",
+                   "far"));
+  ASSERT_EQ(far.exit_code, 0) << far.output;
+  cv::Mat apart;
+  cv::absdiff(distance_in("far"), distance_in("out"), apart);
+  EXPECT_GT(cv::countNonZero(apart < 0.005 * distance_in("out")),
+            0.97 * cv::countNonZero(distance_in("out") > 0));
+}
+
+TEST_F(MovingCamera, NeedsAPoseForEachImage) {
+  const std::string first = "0 0 0 0 0 0 0 1\n";
+  expect_error(depth_at(first, "out"), "has 1 poses for 2 frames without time stamps");
+  expect_error(depth_at(first + "1 0 0 0 0 0 0 1\n", "out"), "baseline");
+  fs::copy_file(file("left.png"), file("1403636579763555.png"));
+  fs::copy_file(file("right.png"), file("1403636579963555.png"));
+  std::string timed = depth_at("1403636579.763555 0 0 0 0 0 0 1\n", "out");
+  timed.replace(timed.find("left.png"), 8, "1403636579763555.png");
+  timed.replace(timed.find("right.png"), 9, "1403636579963555.png");
+  expect_error(timed, "no pose within 0.010000 s of the frame 1403636579963555");
+}
+
 TEST_F(Command, BadImagesAreNamed) {
   folder_.write("empty.png", "");
   folder_.write("garbage.png", "this is no image");

@@ -66,6 +66,31 @@ TEST_F(Sequences, EurocFoldersWithoutListsAreMatchedByName) {
   EXPECT_EQ(frames[0].nanoseconds, 1403636579763555584);
 }
 
+TEST_F(Sequences, ListsAreInNanosecondsHoweverFewDigitsTheyHave) {
+  add("mav0/cam0/data.csv", "50000000,a.png\n");
+  const auto frames = read_sequence(folder_.path(), {0});
+  ASSERT_EQ(frames.size(), 1u);
+  EXPECT_EQ(frames[0].nanoseconds, 50000000);
+}
+
+TEST(TimeInName, IsInTheUnitOfItsDigits) {
+  EXPECT_EQ(time_in_name("1403636579763555584"), 1403636579763555584);
+  EXPECT_EQ(time_in_name("mono_left_1342626147554042"), 1342626147554042000) << "V-Charge";
+  EXPECT_EQ(time_in_name("1418381798086398"), 1418381798086398000) << "RobotCar";
+  EXPECT_EQ(time_in_name("1418381798086"), 1418381798086000000);
+  EXPECT_EQ(time_in_name("1305031102.175304"), 1305031102175304000) << "TUM RGB-D";
+  EXPECT_EQ(time_in_name("rgb-1305031102.1753041234"), 1305031102175304123);
+  EXPECT_EQ(time_in_name("1305031102"), 1305031102000000000);
+}
+
+TEST(TimeInName, IsNoOtherNumber) {
+  for (const char* name :
+       {"", "left", "7", "0000000010", "0000000000000000010", "20261121225338",
+        "12345678901234567890", "1305031102_left", "9999999999999999999", ".5"}) {
+    EXPECT_EQ(time_in_name(name), std::nullopt) << name;
+  }
+}
+
 TEST_F(Sequences, WhatIsMissingIsNamed) {
   EXPECT_THAT(error_of([&] { read_sequence(folder_ / "none", {0, 1}); }), HasSubstr("none"));
   add("cam0/0.png");

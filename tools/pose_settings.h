@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// The command line's options of known poses, shared by the commands that match images of a moving
+// rig.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "widestereo/rig.h"
+#include "widestereo/sequence.h"
+
+/// Poses of the rig, to world.
+struct RigPoses {
+  std::vector<Eigen::Isometry3d> poses;
+  std::string of;  ///< what the file holds, camera or imu; empty without poses
+};
+
+struct PoseSettings {
+  static constexpr const char* camera = "camera";
+  static constexpr const char* imu = "imu";
+
+  std::string file;         ///< empty: none
+  std::string of;           ///< camera or imu; empty: as the file's layout says
+  double tolerance = 0.01;  ///< seconds
+
+  /// Adds --poses, of which `purpose` says what it is for, --poses-of and --poses-tolerance.
+  void add_to(CLI::App& command, const std::string& purpose, const std::string& group);
+  bool given() const { return !file.empty(); }
+  /// The poses at the `chosen` ones of all frames; `calibration` names the file of the rig.
+  RigPoses read(const widestereo::Rig& rig, const std::string& calibration,
+                const std::vector<widestereo::SequenceFrame>& frames,
+                const std::vector<std::size_t>& chosen) const;
+};
