@@ -6,6 +6,8 @@
 #include <numbers>
 
 #include "commands.h"
+#include "pose_settings.h"
+#include "rig_settings.h"
 #include "widestereo/calibration.h"
 #include "widestereo/epipolar.h"
 #include "widestereo/error.h"
@@ -20,7 +22,8 @@ constexpr double degrees = 180 / std::numbers::pi;
 struct CalibrationArguments {
   std::string file, output, format = "kalibr";
   std::string left, right;
-  std::vector<int> views = {0, 1};
+  RigSettings rig;
+  PoseSettings poses;
   bool as_json = false;
 };
 
@@ -149,16 +152,10 @@ void convert(const CalibrationArguments& arguments) {
 void check(const CalibrationArguments& arguments) {
   const cv::Mat left = ws::read_image(arguments.left);
   const cv::Mat right = ws::read_image(arguments.right);
-  const ws::Rig rig = ws::read_calibration(arguments.file, left.size()).rig;
-  const int count = static_cast<int>(rig.views.size());
-  for (const int view : arguments.views) {
-    if (view < 0 || view >= count) {
-      throw ws::Error(arguments.file + " has " + std::to_string(count) +
-                      " camera(s); there is no camera " + std::to_string(view) + ".");
-    }
-  }
-  const ws::View& first = rig.views[arguments.views[0]];
-  const ws::View& second = rig.views[arguments.views[1]];
+  const ws::Rig rig =
+      rig_of_images(arguments.rig, arguments.poses, {arguments.left, arguments.right}, left.size());
+  const ws::View& first = rig.views[0];
+  const ws::View& second = rig.views[1];
   for (const auto& [image, view] : {std::pair(&left, &first), std::pair(&right, &second)}) {
     if (image->cols != view->camera.width || image->rows != view->camera.height) {
       throw ws::Error("The image of " + view->name + " is " + std::to_string(image->cols) + "x" +
@@ -220,11 +217,8 @@ void add_calibration_command(CLI::App& app) {
       "check", "Measure the epipolar error of features matched between two images");
   check_command->add_option("left", arguments->left, "Image of the first camera")->required();
   check_command->add_option("right", arguments->right, "Image of the second camera")->required();
-  check_command->add_option("-c,--calibration", arguments->file, "Calibration file")->required();
-  check_command->add_option("--views", arguments->views, "The two cameras")
-      ->delimiter(',')
-      ->expected(2)
-      ->capture_default_str();
+  arguments->rig.add_to(*check_command);
+  arguments->poses.add_to(*check_command);
   check_command->add_flag("--json", arguments->as_json, "Print JSON");
   check_command->callback([arguments] { check(*arguments); });
 }

@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: MIT
 #include "pose_settings.h"
 
+#include <filesystem>
+#include <numeric>
+
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
+
+void PoseSettings::add_to(CLI::App& command) {
+  add_to(command,
+         "of images taken one after the other, all by camera 0 unless --views names others; by "
+         "time, or one for each in their order",
+         "Moving cameras");
+}
 
 void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const std::string& group) {
   command
@@ -43,4 +53,28 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
   }
   read.poses = ws::poses_of_frames(frames, chosen, trajectory.poses, tolerance, file);
   return read;
+}
+
+ws::Rig rig_of_images(const RigSettings& rig_settings, const PoseSettings& pose_settings,
+                      const std::vector<std::string>& files, cv::Size size) {
+  if (!pose_settings.given()) return rig_settings.rig_for_images(files.size(), size);
+  RigSettings settings = rig_settings;
+  if (settings.views.empty()) settings.views.assign(files.size(), 0);
+  ws::Rig rig = settings.rig_for_images(files.size(), size);
+  std::vector<ws::SequenceFrame> frames;
+  for (const std::filesystem::path file : files) {
+    const std::string name = file.stem().string();
+    frames.push_back({name, {file}, ws::time_in_name(name)});
+  }
+  std::vector<std::size_t> all(frames.size());
+  std::iota(all.begin(), all.end(), 0);
+  const std::vector<Eigen::Isometry3d> poses =
+      pose_settings.read(rig, settings.calibration, frames, all).poses;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    ws::View& view = rig.views[i];
+    view.name = frames[i].name;
+    view.world_from_camera = poses.front().inverse() * poses[i] * view.world_from_camera;
+  }
+  ws::validate(rig, pose_settings.file);
+  return rig;
 }

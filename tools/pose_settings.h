@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The command line's options of known poses, shared by the commands that match images of a moving
-// rig.
+// The command line's options of known poses, shared by the commands for images of a moving rig.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "rig_settings.h"
 #include "widestereo/rig.h"
 #include "widestereo/sequence.h"
 
@@ -25,7 +25,9 @@ struct PoseSettings {
   std::string of;           ///< camera or imu; empty: as the file's layout says
   double tolerance = 0.01;  ///< seconds
 
-  /// Adds --poses, of which `purpose` says what it is for, --poses-of and --poses-tolerance.
+  /// Adds --poses, --poses-of and --poses-tolerance for rig_of_images().
+  void add_to(CLI::App& command);
+  /// The same for another `purpose`.
   void add_to(CLI::App& command, const std::string& purpose, const std::string& group);
   bool given() const { return !file.empty(); }
   /// The poses at the `chosen` ones of all frames; `calibration` names the file of the rig.
@@ -33,3 +35,9 @@ struct PoseSettings {
                 const std::vector<widestereo::SequenceFrame>& frames,
                 const std::vector<std::size_t>& chosen) const;
 };
+
+/// The calibrated views of images as RigSettings::rig_for_images() gives them; with poses, of
+/// images that a rig, or one camera, took at different times: then all are of camera 0 unless `rig`
+/// names others, and the rig's frame is that of the first image.
+widestereo::Rig rig_of_images(const RigSettings& rig, const PoseSettings& poses,
+                              const std::vector<std::string>& files, cv::Size size);

@@ -66,6 +66,12 @@ double triangulated_distance(const Eigen::Vector3d& ray, const Eigen::Vector3d& 
   return centre.cross(other).dot(normal) / normal.squaredNorm();
 }
 
+bool is_masked(const View& view, const Eigen::Vector2d& pixel) {
+  if (view.mask.empty()) return false;
+  const cv::Point nearest(cvRound(pixel.x()), cvRound(pixel.y()));
+  return !nearest.inside({{}, view.mask.size()}) || view.mask.at<uchar>(nearest) == 0;
+}
+
 }  // namespace
 
 std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& second) {
@@ -95,7 +101,8 @@ EpipolarReport check_epipolar(const View& first, const View& second,
   for (const PixelMatch& match : matches) {
     Eigen::Vector3d ray_first;
     Eigen::Vector3d ray_second;
-    if (!unproject(first.camera, match.first, ray_first) ||
+    if (is_masked(first, match.first) || is_masked(second, match.second) ||
+        !unproject(first.camera, match.first, ray_first) ||
         !unproject(second.camera, match.second, ray_second)) {
       continue;
     }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "data_folder.h"
@@ -68,6 +70,18 @@ TEST(Epipolar, MeasuresAKnownRotationError) {
   EXPECT_LT(report.median_degrees, 1.01);
   EXPECT_GT(report.median_pixels, 1);
   EXPECT_LT(report.median_pixels, 4);
+}
+
+TEST(Epipolar, LeavesOutWhatIsMasked) {
+  Rig rig = rig_with_rotation_error(0);
+  const std::vector<PixelMatch> matches = exact_matches(rig);
+  View& second = rig.views[1];
+  second.mask = cv::Mat(512, 512, CV_8UC1, cv::Scalar(255));
+  second.mask.colRange(0, 256).setTo(0);
+  const auto seen = std::count_if(matches.begin(), matches.end(), [](const PixelMatch& match) {
+    return std::round(match.second.x()) >= 256;
+  });
+  EXPECT_EQ(check_epipolar(rig.views[0], second, matches).matches, seen);
 }
 
 TEST(Epipolar, NeedsMatches) {

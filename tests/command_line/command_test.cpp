@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command_fixture.h"
+#include "data_folder.h"
 
 namespace widestereo::test {
 namespace {
@@ -118,6 +119,19 @@ TEST_F(MovingCamera, NeedsAPoseForEachImage) {
   timed.replace(timed.find("left.png"), 8, "1403636579763555.png");
   timed.replace(timed.find("right.png"), 9, "1403636579963555.png");
   expect_error(timed, "no pose within 0.010000 s of the frame 1403636579963555");
+}
+
+/// As accurate as the data set says its odometry is.
+TEST_F(MovingCamera, OfARealCarFitsItsPoses) {
+  if (data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  const fs::path set = data_folder() / "real/psl_fisheye_left";
+  const std::string image = (set / "images/mono_left_1342626147").string();
+  const Outcome outcome =
+      run("calibration check " + image + "714042.png " + image +
+          "794042.png --max-theta 95 --json -c " + (set / "calib.yaml").string() + " --poses " +
+          (set / "poses_cam_to_world.txt").string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_LT(nlohmann::json::parse(outcome.output)["median_pixels"].get<double>(), 0.4);
 }
 
 TEST_F(Command, BadImagesAreNamed) {
