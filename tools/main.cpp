@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   add_depth_command(app);
   add_sequence_command(app);
   add_evaluate_command(app);
+  add_view_synthesis_command(app);
   add_calibration_command(app);
   add_devices_command(app);
   add_benchmark_command(app);

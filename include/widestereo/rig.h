@@ -36,6 +36,9 @@ inline double baseline(const View& a, const View& b) {
   return (a.world_from_camera.translation() - b.world_from_camera.translation()).norm();
 }
 
+/// Whether the view's mask excludes the pixel nearest to a position, or what lies outside the mask.
+bool is_masked(const View& view, const Eigen::Vector2d& position);
+
 /// Throws Error unless every camera is valid, every pose (the IMU's, too) is rigid and finite,
 /// masks fit and no two views share a centre. `name` (a file, say) begins the message.
 void validate(const Rig& rig, const std::string& name);

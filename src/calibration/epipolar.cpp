@@ -66,12 +66,6 @@ double triangulated_distance(const Eigen::Vector3d& ray, const Eigen::Vector3d& 
   return centre.cross(other).dot(normal) / normal.squaredNorm();
 }
 
-bool is_masked(const View& view, const Eigen::Vector2d& pixel) {
-  if (view.mask.empty()) return false;
-  const cv::Point nearest(cvRound(pixel.x()), cvRound(pixel.y()));
-  return !nearest.inside({{}, view.mask.size()}) || view.mask.at<uchar>(nearest) == 0;
-}
-
 }  // namespace
 
 std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& second) {

@@ -286,6 +286,30 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
 }
 
+TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
+  cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
+  cv::imwrite(file("near.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
+  const auto synthesis = [&](const std::string& distance, const std::string& more) {
+    return "view-synthesis " + file(distance) + " " + file("left.png") + " " + file("right.png") +
+           " -c " + file("calib.yaml") + more;
+  };
+  // Both images are the same: the distance is infinite.
+  Outcome outcome = run(synthesis("far.tiff", " --json --picture " + file("warped.png")));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json right = nlohmann::json::parse(outcome.output);
+  EXPECT_GT(right["above_0.9"].get<double>(), 0.99);
+  EXPECT_GT(right["windows"].get<long>(), 5000);
+  EXPECT_EQ(cv::imread(file("warped.png"), cv::IMREAD_UNCHANGED).size(), cv::Size(96, 96));
+  outcome = run(synthesis("near.tiff", " --json"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_LT(nlohmann::json::parse(outcome.output)["above_0.9"].get<double>(), 0.1);
+  outcome = run(synthesis("far.tiff", ""));
+  EXPECT_NE(outcome.output.find("textured windows"), std::string::npos) << outcome.output;
+  expect_error(synthesis("none.tiff", ""), "none.tiff");
+  cv::imwrite(file("small.tiff"), cv::Mat(9, 8, CV_32FC1, cv::Scalar(1)));
+  expect_error(synthesis("small.tiff", ""), "8x9 pixels");
+}
+
 TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   const std::string common = "benchmark --devices cpu --presets fast --sizes 64 --runs 2 -o " +
                              file("speed.json") + " --plot " + file("speed.svg");
@@ -341,8 +365,8 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
 TEST_F(Command, HelpAndVersion) {
   for (const char* arguments :
        {"--help", "demo --help", "depth --help", "sequence --help", "evaluate --help",
-        "calibration --help", "calibration show --help", "devices --help", "benchmark --help",
-        "--version", "devices", "devices --json"}) {
+        "view-synthesis --help", "calibration --help", "calibration show --help", "devices --help",
+        "benchmark --help", "--version", "devices", "devices --json"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << outcome.output;
     EXPECT_FALSE(outcome.output.empty());

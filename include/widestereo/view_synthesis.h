@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "widestereo/rig.h"
+
+namespace widestereo {
+
+/// Another view's image, warped to where the distances say that its pixels lie.
+struct SynthesisedView {
+  cv::Mat image;    ///< CV_32FC1, grey levels, of the distance map's size
+  cv::Mat visible;  ///< CV_8UC1, 255 where the point has a distance and the other view sees it
+};
+
+/// `distance`: CV_32FC1, metres along the rays of `view` (<= 0 or non-finite: none); `other_image`:
+/// CV_8UC1, grey levels. A point is hidden when another one that lands within 2 pixels of it is
+/// nearer to the other camera by more than 5 %.
+SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
+                                const cv::Mat& other_image, const View& other);
+
+/// Quality without ground truth: correlation (ZNCC) of the view's image and the synthesised one in
+/// windows of 11x11 pixels, of which 70 % or more are visible and whose grey levels deviate by 3 or
+/// more. An image that took no part in matching makes it independent of the matcher's own cost.
+struct SynthesisScores {
+  double visible = 0;  ///< share of the pixels with a distance that the other view sees
+  long windows = 0;    ///< scored
+  double mean = 0;     ///< of their ZNCC
+  double above_0_7 = 0, above_0_8 = 0, above_0_9 = 0;  ///< shares of them
+};
+
+/// `image`: CV_8UC1, grey levels, of `view`. Throws Error for maps of other sizes.
+SynthesisScores synthesis_scores(const cv::Mat& distance, const View& view, const cv::Mat& image,
+                                 const View& other, const cv::Mat& other_image);
+
+/// The scores as a line and as JSON text.
+std::string to_table(const SynthesisScores& scores);
+std::string to_json(const SynthesisScores& scores);
+
+}  // namespace widestereo

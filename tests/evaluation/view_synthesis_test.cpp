@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/view_synthesis.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "error_of.h"
+#include "widestereo/synthesis.h"
+
+namespace widestereo::test {
+namespace {
+
+/// The demo scene with its true distances.
+class ViewSynthesis : public ::testing::Test {
+ protected:
+  static cv::Mat grey(const RenderedView& view) {
+    cv::Mat image;
+    cv::cvtColor(view.image, image, cv::COLOR_BGR2GRAY);
+    return image;
+  }
+  SynthesisScores scores_of(const cv::Mat& distance, const Rig& rig) const {
+    return synthesis_scores(distance, rig.views[0], grey(pair.views[0]), rig.views[1],
+                            grey(pair.views[1]));
+  }
+  const RenderedPair pair = render_demo(256);
+  const cv::Mat truth = pair.views[0].truth.distance;
+};
+
+TEST_F(ViewSynthesis, OfTrueDistancesFitsAndOfWrongOnesDoesNot) {
+  const SynthesisScores right = scores_of(truth, pair.rig);
+  EXPECT_GT(right.mean, 0.95);
+  EXPECT_GT(right.above_0_8, 0.95);
+  EXPECT_GT(right.windows, 10000);
+  const SynthesisScores wrong = scores_of(0.4 * truth, pair.rig);
+  EXPECT_LT(wrong.mean, 0.6);
+  EXPECT_LT(wrong.above_0_8, 0.5 * right.above_0_8);
+}
+
+TEST_F(ViewSynthesis, SeesWhatIsNotOccluded) {
+  const SynthesisedView synthesised =
+      synthesise_view(truth, pair.rig.views[0], grey(pair.views[1]), pair.rig.views[1]);
+  const cv::Mat occlusion = pair.views[0].truth.occlusion;
+  const cv::Mat scored = truth > 0;
+  cv::Mat differs;
+  cv::compare(synthesised.visible, occlusion == 255, differs, cv::CMP_NE);
+  EXPECT_LT(cv::countNonZero(differs & scored), 0.02 * cv::countNonZero(scored));
+  const cv::Mat hidden = scored & (occlusion == 0);
+  EXPECT_GT(cv::countNonZero(hidden & (synthesised.visible == 0)), 0.5 * cv::countNonZero(hidden));
+}
+
+TEST_F(ViewSynthesis, LeavesOutWhatHasNoDistanceOrIsMasked) {
+  cv::Mat half = truth.clone();
+  half.colRange(0, 128).setTo(0);
+  const SynthesisedView synthesised =
+      synthesise_view(half, pair.rig.views[0], grey(pair.views[1]), pair.rig.views[1]);
+  EXPECT_EQ(cv::countNonZero(synthesised.visible.colRange(0, 128)), 0);
+  Rig rig = pair.rig;
+  rig.views[1].mask = cv::Mat(256, 256, CV_8UC1, cv::Scalar(0));
+  EXPECT_EQ(scores_of(truth, rig).windows, 0);
+  EXPECT_EQ(scores_of(truth, rig).visible, 0);
+}
+
+TEST_F(ViewSynthesis, NeedsMapsOfTheCalibratedSize) {
+  EXPECT_THAT(error_of([&] { scores_of(cv::Mat(9, 8, CV_32FC1, cv::Scalar(1)), pair.rig); }),
+              ::testing::HasSubstr("distance map of cam0 is 8x9 pixels"));
+}
+
+}  // namespace
+}  // namespace widestereo::test

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "pose_settings.h"
+#include "rig_settings.h"
+#include "widestereo/image_io.h"
+#include "widestereo/view_synthesis.h"
+
+namespace ws = widestereo;
+
+namespace {
+
+struct SynthesisArguments {
+  std::string distance, image, other;
+  std::string picture;
+  RigSettings rig;
+  PoseSettings poses;
+  bool as_json = false;
+};
+
+void run_synthesis(const SynthesisArguments& a) {
+  const auto read_grey = [](const std::string& file) {
+    return ws::to_grey_levels(ws::read_image(file), file);
+  };
+  const cv::Mat image = read_grey(a.image);
+  const cv::Mat other = read_grey(a.other);
+  const ws::Rig rig = rig_of_images(a.rig, a.poses, {a.image, a.other}, image.size());
+  const cv::Mat distance = ws::read_map(a.distance);
+  const ws::SynthesisScores scores =
+      ws::synthesis_scores(distance, rig.views[0], image, rig.views[1], other);
+  std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
+  if (!a.picture.empty()) {
+    cv::Mat picture;
+    ws::synthesise_view(distance, rig.views[0], other, rig.views[1])
+        .image.convertTo(picture, CV_8U);
+    ws::write_image(a.picture, picture);
+  }
+}
+
+}  // namespace
+
+void add_view_synthesis_command(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "view-synthesis",
+      "Score a distance map without ground truth, by warping another image into its view");
+  auto a = std::make_shared<SynthesisArguments>();
+  command->add_option("distance", a->distance, "Distance map")->required();
+  command->add_option("image", a->image, "The image that it is of")->required();
+  command->add_option("other", a->other, "Another image, best one that took no part in matching")
+      ->required();
+  a->rig.add_to(*command);
+  a->poses.add_to(*command);
+  command->add_option("--picture", a->picture, "Write the warped image");
+  command->add_flag("--json", a->as_json, "Print JSON");
+  command->callback([a] { run_synthesis(*a); });
+}
