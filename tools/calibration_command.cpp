@@ -156,14 +156,8 @@ void check(const CalibrationArguments& arguments) {
       rig_of_images(arguments.rig, arguments.poses, {arguments.left, arguments.right}, left.size());
   const ws::View& first = rig.views[0];
   const ws::View& second = rig.views[1];
-  for (const auto& [image, view] : {std::pair(&left, &first), std::pair(&right, &second)}) {
-    if (image->cols != view->camera.width || image->rows != view->camera.height) {
-      throw ws::Error("The image of " + view->name + " is " + std::to_string(image->cols) + "x" +
-                      std::to_string(image->rows) + " pixels, its calibration " +
-                      std::to_string(view->camera.width) + "x" +
-                      std::to_string(view->camera.height) + "; use images of the calibrated size.");
-    }
-  }
+  ws::require_calibrated_size(left, first, arguments.left);
+  ws::require_calibrated_size(right, second, arguments.right);
   const ws::EpipolarReport r = check_epipolar(first, second, ws::match_features(left, right));
   const char* verdict = r.median_pixels < 0.5   ? "good"
                         : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"

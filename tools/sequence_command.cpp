@@ -93,12 +93,7 @@ Selection select_frames(const SequenceArguments& a) {
 void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& images,
                    const ws::Rig& rig) {
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const ws::Camera& camera = rig.views[i].camera;
-    if (images[i].cols == camera.width && images[i].rows == camera.height) continue;
-    throw ws::Error(frame.images[i].string() + " is " + std::to_string(images[i].cols) + "x" +
-                    std::to_string(images[i].rows) + " pixels, but the calibration of " +
-                    rig.views[i].name + " is for " + std::to_string(camera.width) + "x" +
-                    std::to_string(camera.height) + "; use images of the calibrated size.");
+    ws::require_calibrated_size(images[i], rig.views[i], frame.images[i].string());
   }
 }
 

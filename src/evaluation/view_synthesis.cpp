@@ -7,8 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "widestereo/error.h"
-
 namespace widestereo {
 namespace {
 
@@ -17,14 +15,6 @@ constexpr double least_visible = 0.7;
 constexpr double least_deviation = 3;  // grey levels
 constexpr float hidden_behind = 1.05f;
 constexpr int cell = 2;  // pixels
-
-void require_size(const cv::Mat& map, const View& view, const char* what) {
-  if (map.cols == view.camera.width && map.rows == view.camera.height) return;
-  throw Error(std::string("The ") + what + " of " + view.name + " is " + std::to_string(map.cols) +
-              "x" + std::to_string(map.rows) + " pixels, its calibration " +
-              std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) +
-              "; use maps and images of the calibrated size.");
-}
 
 /// Means over the window around each pixel, what lies outside counting as 0.
 cv::Mat window_mean(const cv::Mat& map) {
@@ -37,8 +27,8 @@ cv::Mat window_mean(const cv::Mat& map) {
 
 SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
                                 const cv::Mat& other_image, const View& other) {
-  require_size(distance, view, "distance map");
-  require_size(other_image, other, "image");
+  require_calibrated_size(distance, view, "The distance map of " + view.name);
+  require_calibrated_size(other_image, other, "The image of " + other.name);
   const Eigen::Isometry3d motion = source_from_reference(other, view);
   const cv::Size size = distance.size();
   cv::Mat_<cv::Point2f> places(size, cv::Point2f(-1, -1));
@@ -86,7 +76,7 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
 
 SynthesisScores synthesis_scores(const cv::Mat& distance, const View& view, const cv::Mat& image,
                                  const View& other, const cv::Mat& other_image) {
-  require_size(image, view, "image");
+  require_calibrated_size(image, view, "The image of " + view.name);
   const SynthesisedView synthesised = synthesise_view(distance, view, other_image, other);
   cv::Mat seen, a, b;
   synthesised.visible.convertTo(seen, CV_64F, 1 / 255.0);

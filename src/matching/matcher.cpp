@@ -20,14 +20,9 @@ kernel::vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 
 /// Intensities with every pixel without a usable ray marked as masked.
 cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat& rays) {
-  const cv::Size size(view.camera.width, view.camera.height);
-  if (image.size() != size) {
-    throw Error("The image of " + view.name + " is " + std::to_string(image.cols) + "x" +
-                std::to_string(image.rows) + " pixels, but its calibration is for " +
-                std::to_string(size.width) + "x" + std::to_string(size.height) +
-                "; use images of the calibrated size.");
-  }
-  cv::Mat intensity = to_intensity(image, "The image of " + view.name);
+  const std::string name = "The image of " + view.name;
+  require_calibrated_size(image, view, name);
+  cv::Mat intensity = to_intensity(image, name);
   cv::Mat usable;
   cv::extractChannel(rays, usable, 3);
   intensity.setTo(MASKED_INTENSITY, usable == 0);
