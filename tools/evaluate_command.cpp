@@ -31,11 +31,6 @@ cv::Mat read_mask(const fs::path& path) {
   return image;
 }
 
-/// 8-bit grey levels of any image.
-cv::Mat read_grey(const fs::path& path) {
-  return ws::to_grey_levels(ws::read_image(path), path.string());
-}
-
 /// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),
 /// normalN.tiff, camN.png, fovN.png and calib.yaml.
 void take_from_set(EvaluateArguments& a) {
@@ -66,7 +61,7 @@ void run_evaluate(EvaluateArguments a) {
   if (!a.valid.empty()) truth.valid = read_mask(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_mask(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = ws::read_map(a.truth_normals);
-  if (!a.image.empty()) truth.image = read_grey(a.image);
+  if (!a.image.empty()) truth.image = ws::read_grey_levels(a.image);
   if (a.far_distance > 0) {
     if (a.field_of_view.empty()) {
       throw ws::Error("--far-distance needs --field-of-view, or a folder with it by --set.");

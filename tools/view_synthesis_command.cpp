@@ -22,20 +22,18 @@ struct SynthesisArguments {
 };
 
 void run_synthesis(const SynthesisArguments& a) {
-  const auto read_grey = [](const std::string& file) {
-    return ws::to_grey_levels(ws::read_image(file), file);
-  };
-  const cv::Mat image = read_grey(a.image);
-  const cv::Mat other = read_grey(a.other);
+  const cv::Mat image = ws::read_grey_levels(a.image);
+  const cv::Mat other = ws::read_grey_levels(a.other);
   const ws::Rig rig = rig_of_images(a.rig, a.poses, {a.image, a.other}, image.size());
   const cv::Mat distance = ws::read_map(a.distance);
-  const ws::SynthesisScores scores =
-      ws::synthesis_scores(distance, rig.views[0], image, rig.views[1], other);
+  ws::require_calibrated_size(image, rig.views[0], a.image);
+  const ws::SynthesisedView synthesised =
+      ws::synthesise_view(distance, rig.views[0], other, rig.views[1]);
+  const ws::SynthesisScores scores = ws::synthesis_scores(distance, image, synthesised);
   std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
   if (!a.picture.empty()) {
     cv::Mat picture;
-    ws::synthesise_view(distance, rig.views[0], other, rig.views[1])
-        .image.convertTo(picture, CV_8U);
+    synthesised.image.convertTo(picture, CV_8U);
     ws::write_image(a.picture, picture);
   }
 }

@@ -27,6 +27,8 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name);
 
 /// The same as grey levels 0 to 255, CV_8UC1.
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
+/// Of a file.
+cv::Mat read_grey_levels(const std::filesystem::path& path);
 
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm or .png (16 bit, divided
 /// by `png_scale`, which is the PNG units per metre). Throws Error.

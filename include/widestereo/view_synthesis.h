@@ -30,9 +30,10 @@ struct SynthesisScores {
   double above_0_7 = 0, above_0_8 = 0, above_0_9 = 0;  ///< shares of them
 };
 
-/// `image`: CV_8UC1, grey levels, of `view`. Throws Error for maps of other sizes.
-SynthesisScores synthesis_scores(const cv::Mat& distance, const View& view, const cv::Mat& image,
-                                 const View& other, const cv::Mat& other_image);
+/// `image`: CV_8UC1, grey levels, of the view that was synthesised from `distance`. Throws Error
+/// for maps of different sizes.
+SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
+                                 const SynthesisedView& synthesised);
 
 /// The scores as a line and as JSON text.
 std::string to_table(const SynthesisScores& scores);

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "widestereo/error.h"
+
 namespace widestereo {
 namespace {
 
@@ -74,10 +76,14 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
   return synthesised;
 }
 
-SynthesisScores synthesis_scores(const cv::Mat& distance, const View& view, const cv::Mat& image,
-                                 const View& other, const cv::Mat& other_image) {
-  require_calibrated_size(image, view, "The image of " + view.name);
-  const SynthesisedView synthesised = synthesise_view(distance, view, other_image, other);
+SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
+                                 const SynthesisedView& synthesised) {
+  const cv::Size size = synthesised.image.size();
+  if (image.size() != size || distance.size() != size) {
+    throw Error(
+        "A synthesised view, its distances and the image to compare differ in size; use "
+        "maps of one view.");
+  }
   cv::Mat seen, a, b;
   synthesised.visible.convertTo(seen, CV_64F, 1 / 255.0);
   image.convertTo(a, CV_64F);

@@ -164,6 +164,10 @@ cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name) {
   return grey;
 }
 
+cv::Mat read_grey_levels(const std::filesystem::path& path) {
+  return to_grey_levels(read_image(path), path.string());
+}
+
 cv::Mat read_map(const fs::path& path, double png_scale) {
   const std::string extension = extension_of(path);
   if (extension == ".pfm") return read_pfm(path, read_bytes(path));

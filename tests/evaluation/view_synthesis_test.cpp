@@ -21,8 +21,9 @@ class ViewSynthesis : public ::testing::Test {
     return image;
   }
   SynthesisScores scores_of(const cv::Mat& distance, const Rig& rig) const {
-    return synthesis_scores(distance, rig.views[0], grey(pair.views[0]), rig.views[1],
-                            grey(pair.views[1]));
+    return synthesis_scores(
+        distance, grey(pair.views[0]),
+        synthesise_view(distance, rig.views[0], grey(pair.views[1]), rig.views[1]));
   }
   const RenderedPair pair = render_demo(256);
   const cv::Mat truth = pair.views[0].truth.distance;
