@@ -88,6 +88,10 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
   add("--regression-precision", regression_precision,
       "Precision that lets the regression do with a smaller neighbourhood, pixels");
+  add("--vote-radius", vote_radius,
+      "After each regression pixels take the plane that most up to this many pixels away agree "
+      "with; "
+      "0 = do not");
   add("--repair-radius", repair_radius,
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
   add("--far-preference", far_preference,
@@ -143,6 +147,7 @@ Options MatchSettings::options() const {
   take(options.regression_radius, regression_radius);
   take(options.regression_scale, regression_scale);
   take(options.regression_precision, regression_precision);
+  take(options.vote_radius, vote_radius);
   take(options.repair_radius, repair_radius);
   take(options.far_preference, far_preference);
   take(options.step_pixels, step_pixels);

@@ -23,7 +23,7 @@ struct MatchSettings {
   std::optional<std::uint32_t> seed;
   std::optional<double> min_texture, min_visible, max_cost, min_parallax, max_tilt, min_support,
       ambiguity_margin, far_preference;
-  std::optional<int> repair_radius, fill_radius;
+  std::optional<int> vote_radius, repair_radius, fill_radius;
   std::optional<double> consistency_relative, consistency_pixels;
   std::optional<int> levels, sweep_steps, regression_radius, warm_iterations, warm_regressions;
   std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,

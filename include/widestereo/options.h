@@ -85,6 +85,9 @@ struct Options {
   /// ones up to this many pixels away, as a new hypothesis (not in frames started from the one
   /// before), 0..10000; 0 = none do.
   int repair_radius = 32;
+  /// After that, every pixel takes the plane which most of the planes up to this many pixels away
+  /// agree with, 0..64; 0 = it keeps its own.
+  int vote_radius = 8;
   /// How much better (cost) the nearest planes must match than the farthest, so that surfaces
   /// without texture and sky come out as far, 0..2.
   double far_preference = 0;
@@ -97,7 +100,7 @@ struct Options {
   /// SearchMethod::pyramid: rounds of plane regression, >= 0, and the precision (see
   /// regression_precision) that ends each: less than a cold frame's, because frames average, too,
   /// and neighbourhoods that overlap from frame to frame would spread across edges.
-  int warm_regressions = 2;
+  int warm_regressions = 1;
   double warm_precision = 0.025;
 
   double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation

@@ -35,6 +35,7 @@ constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
     kernel::cpu::adopt_pixel,
     kernel::cpu::fill_pixel,
     kernel::cpu::adopt_fill_pixel,
+    kernel::cpu::vote_pixel,
     kernel::cpu::transfer_keep_pixel,
     kernel::cpu::renew_pixel};
 

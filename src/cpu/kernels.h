@@ -121,6 +121,7 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "transfer.glsl"
 #include "check.glsl"
 #include "fill.glsl"
+#include "vote.glsl"
 // clang-format on
 
 }  // namespace widestereo::kernel::cpu

@@ -122,6 +122,7 @@ struct Algorithm {
 #include "transfer.glsl"
 #include "check.glsl"
 #include "fill.glsl"
+#include "vote.glsl"
   // clang-format on
 
   /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
@@ -161,6 +162,7 @@ ENTRY_POINT(regress, reference)
 ENTRY_POINT(adopt, reference)
 ENTRY_POINT(fill, reference)
 ENTRY_POINT(adopt_fill, reference)
+ENTRY_POINT(vote, reference)
 ENTRY_POINT(transfer_keep, reference)
 ENTRY_POINT(renew, reference)
 

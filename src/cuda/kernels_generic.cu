@@ -21,6 +21,7 @@ KernelTable generic_kernels() {
                                         KERNEL_ENTRY(adopt, C),
                                         KERNEL_ENTRY(fill, C),
                                         KERNEL_ENTRY(adopt_fill, C),
+                                        KERNEL_ENTRY(vote, C),
                                         KERNEL_ENTRY(transfer_keep, C),
                                         KERNEL_ENTRY(renew, C)};
   return table_of(entries);

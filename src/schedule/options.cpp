@@ -110,6 +110,7 @@ void validate(const Options& o) {
   require_between(o.min_support, 0, 1, "min support");
   require_between(o.ambiguity_margin, 0, 2, "ambiguity margin");
   require_between(o.far_preference, 0, 2, "far preference");
+  require_between(o.vote_radius, 0, 64, "vote radius");
   require_between(o.repair_radius, 0, 10000, "repair radius");
   require_between(o.fill_radius, 0, 10000, "fill radius");
 }
@@ -131,6 +132,7 @@ std::string to_json(const Options& o) {
                                        {"regression_radius", o.regression_radius},
                                        {"regression_scale", o.regression_scale},
                                        {"regression_precision", o.regression_precision},
+                                       {"vote_radius", o.vote_radius},
                                        {"repair_radius", o.repair_radius},
                                        {"far_preference", o.far_preference},
                                        {"step_pixels", o.step_pixels},

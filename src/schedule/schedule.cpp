@@ -181,13 +181,15 @@ class Builder {
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) {
-          regress(view, level, options_.regression_precision);
+          regress(view, level, options_.regression_precision, level == 0 ? until_vote() : 0);
         }
-        if (level == 0) repair();
+        if (level > 0) continue;
+        repair();
+        vote();
       }
     }
     if (options_.level_regressions.back() > 0) {
-      for (const int view : views_of(0)) regress(view, 0, 0);
+      for (const int view : views_of(0)) regress(view, 0, 0, 0);
     }
   }
 
@@ -263,12 +265,14 @@ class Builder {
     // Measured once for all rounds, so that planes need their costs after the last one only.
     for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
     for (int i = 1; i <= options_.warm_regressions; ++i) {
-      const bool last = i == options_.warm_regressions;
+      const unsigned how =
+          i == options_.warm_regressions ? regress_normals | until_vote() : adopt_unseen;
       for (const int view : views_of(0)) {
-        regress_measured(view, 0, options_.warm_precision, last ? regress_normals : adopt_unseen);
+        regress_measured(view, 0, options_.warm_precision, how);
       }
     }
     repair();
+    vote();
   }
 
   void iterate(int view, int iterations) {
@@ -322,10 +326,10 @@ class Builder {
     }
   }
 
-  /// `precision`: 0 leaves the distances as they are.
-  void regress(int view, int level, double precision) {
+  /// `precision`: 0 leaves the distances as they are. `how`: see shaders/regression.glsl.
+  void regress(int view, int level, double precision, unsigned how) {
     add(Kernel::measure, pass_of(view), view, 0);
-    regress_measured(view, level, precision, 0);
+    regress_measured(view, level, precision, how);
   }
 
   void regress_measured(int view, int level, double precision, unsigned how) {
@@ -340,6 +344,20 @@ class Builder {
     pass.candidates = how;
     add(Kernel::regress, pass, view, 0);
     add(Kernel::adopt, pass, view, (how & adopt_unseen) != 0 ? 0 : 1);
+  }
+
+  /// Planes need their costs only once they have been voted on.
+  unsigned until_vote() const { return options_.vote_radius > 0 ? adopt_unseen : 0; }
+
+  void vote() {
+    if (options_.vote_radius == 0) return;
+    for (const int view : views_of(0)) {
+      kernel::PassParameters pass = pass_of(view);
+      pass.iteration = regressions_;
+      pass.steps = options_.vote_radius;
+      add(Kernel::vote, pass, view, 0);
+      add(Kernel::adopt, pass, view, 1);
+    }
   }
 
   /// Checks every view, then fills: filled planes must not count as a source's own.
@@ -402,6 +420,7 @@ const char* to_string(Kernel kernel) {
                                                                   "adopt",
                                                                   "fill",
                                                                   "adopt_fill",
+                                                                  "vote",
                                                                   "transfer_keep",
                                                                   "renew"};
   return names[static_cast<std::size_t>(kernel)];

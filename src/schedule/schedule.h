@@ -30,10 +30,11 @@ enum class Kernel {
   adopt,             ///< takes those planes over
   fill,              ///< planes of accepted pixels for the rejected ones around them
   adopt_fill,        ///< takes those planes over and marks the pixels
+  vote,              ///< planes which most of the planes around agree with
   transfer_keep,     ///< keeps a view's own planes, moved on from the previous frame
   renew,             ///< starts a view from those
 };
-inline constexpr int kernel_count = 19;
+inline constexpr int kernel_count = 20;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).

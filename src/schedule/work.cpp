@@ -119,6 +119,8 @@ Traffic traffic_of(const Dispatch& dispatch) {
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt_fill:
       return {prior | checks | seen, intensity, plane | checks};
+    case Kernel::vote:
+      return {seen | plane, 0, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
     case Kernel::renew:
