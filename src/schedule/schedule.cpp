@@ -255,7 +255,7 @@ class Builder {
   /// each colour, carry surfaces into what has come into view, perturbations follow what moved, and
   /// random distances find what has come near; the regression then averages.
   void search_warm() {
-    constexpr unsigned perturbations = inverse_distance | both | random_distance;
+    constexpr unsigned perturbations = inverse_distance | random_distance;
     for (int i = 0; i < options_.warm_iterations; ++i) {
       for (const int view : views_of(0)) {
         search(view, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
