@@ -252,8 +252,9 @@ class Builder {
   }
 
   /// Little more than what corrects planes that are nearly right: the near strips, half of them for
-  /// each colour, carry surfaces into what has come into view, perturbations follow what moved, and
-  /// random distances find what has come near; the regression then averages.
+  /// each colour, carry surfaces into what has come into view, perturbations of distance follow what
+  /// moved, and random distances find what has come near; the regression then averages, and finds
+  /// the normals.
   void search_warm() {
     constexpr unsigned perturbations = inverse_distance | random_distance;
     for (int i = 0; i < options_.warm_iterations; ++i) {
