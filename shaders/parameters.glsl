@@ -47,5 +47,5 @@ struct PassParameters {
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
                       // regression: standard deviation (px) that is enough; 0: normals only
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
-  int steps;          // sweep: inverse distances; regression, filling: radius in pixels; check: other places
+  int steps;          // sweep: inverse distances; regression, vote, filling: radius in pixels; check: other places
 };
