@@ -88,12 +88,11 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
   add("--regression-precision", regression_precision,
       "Precision that lets the regression do with a smaller neighbourhood, pixels");
-  add("--vote-radius", vote_radius,
-      "After each regression pixels take the plane that most up to this many pixels away agree "
-      "with; "
-      "0 = do not");
   add("--repair-radius", repair_radius,
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
+  add("--vote-radius", vote_radius,
+      "Then pixels take the plane that most planes up to this many pixels away agree with; 0 = do "
+      "not");
   add("--far-preference", far_preference,
       "How much better the nearest planes must match than the farthest, which keeps sky far");
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");

@@ -39,6 +39,14 @@ inline Rig fisheye_rig(int size, double max_theta = 1.7) {
   return rig;
 }
 
+/// A preset's options for distances of 0.2 to 100 m.
+inline Options wide_range(const std::string& preset = "paper") {
+  Options options = Options::preset_named(preset);
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  return options;
+}
+
 /// Smooth noise in [0.1, 0.9] with features of a few pixels.
 inline cv::Mat smooth_noise(cv::Size size, int seed) {
   cv::RNG random(seed);

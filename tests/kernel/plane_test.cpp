@@ -280,13 +280,6 @@ class AgreeingViews {
   KernelFixture fixture;
 };
 
-Options wide_range() {
-  Options options;
-  options.min_distance = 0.2;
-  options.max_distance = 100;
-  return options;
-}
-
 TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {
   AgreeingViews views(wide_range());
   EXPECT_EQ(views.reasons({48, 48}) & REASON_SPECKLE, 0);

@@ -17,13 +17,6 @@ constexpr int size = 96;
 constexpr double speed = 3;
 constexpr float grey = 0.5f;
 
-Options options() {
-  Options options = Options::preset_named("fast");
-  options.min_distance = 0.2;
-  options.max_distance = 100;
-  return options;
-}
-
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / CV_PI;
 }
@@ -33,7 +26,7 @@ class Regression : public ::testing::Test {
  protected:
   using Truth = std::function<Eigen::Vector3d(int x)>;
 
-  Regression() : fixture_(fisheye_rig(size), options()) {
+  Regression() : fixture_(fisheye_rig(size), wide_range("fast")) {
     fixture_.view(0).image().setTo(grey);
     fixture_.set_reference(0);
   }

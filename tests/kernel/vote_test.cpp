@@ -19,7 +19,7 @@ constexpr int edge = 44;
 
 class Vote : public ::testing::Test {
  protected:
-  Vote() : fixture_(fisheye_rig(size), options()) {
+  Vote() : fixture_(fisheye_rig(size), wide_range("fast")) {
     fixture_.set_reference(0);
     fixture_.pass().steps = 8;
     fill(0, size, dark, far_plane);
@@ -43,14 +43,6 @@ class Vote : public ::testing::Test {
   }
 
   KernelFixture fixture_;
-
- private:
-  static Options options() {
-    Options options = Options::preset_named("fast");
-    options.min_distance = 0.2;
-    options.max_distance = 100;
-    return options;
-  }
 };
 
 TEST_F(Vote, TakesBackWhatTheNearerSurfaceSpreadOver) {
