@@ -38,7 +38,7 @@ struct PassParameters {
   int other;       // the one view that a transfer or a change of level reads from
   int iteration;   // counts over the whole schedule of this view
   int colour;      // 0, 1: checkerboard; -1: all pixels
-  int neighbours;  // bits: left, right, up, down
+  int neighbours;  // bits: left, right, up, down; regression: steps of its grid of neighbours in the radius
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last

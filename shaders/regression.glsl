@@ -10,9 +10,9 @@
 #define LARGEST_RESIDUAL 0.6f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
-// Rounds for distances, the last two over the whole radius, the others over a quarter and a half of it.
-#define REGRESSION_ROUNDS 4
-#define WHOLE_RADIUS_ROUND 2
+// Rounds for distances, the last two over the whole radius, the others over an eighth, a quarter and a half of it.
+#define REGRESSION_ROUNDS 5
+#define WHOLE_RADIUS_ROUND 3
 // Rounds for normals alone: over an eighth, twice a half, and the whole radius.
 #define NORMAL_ROUNDS 4
 // Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
@@ -126,7 +126,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float fall_off = 2.0f / float(radius * radius);
-  int step = max(radius / 3, 1);
+  int step = max(radius / PASS.neighbours, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;

@@ -85,9 +85,12 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--level-regressions", level_regressions, "Plane regressions of each level, coarsest first")
       ->delimiter(',');
   add("--regression-radius", regression_radius, "Radius of the plane regression, pixels");
+  add("--regression-steps", regression_steps,
+      "Steps in that radius of the grid of neighbours that count");
   add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
   add("--regression-precision", regression_precision,
-      "Precision that lets the regression do with a smaller neighbourhood, pixels");
+      "Precision that lets the regression do with a smaller neighbourhood, pixels; falls from "
+      "round to round");
   add("--repair-radius", repair_radius,
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
   add("--vote-radius", vote_radius,
@@ -100,7 +103,6 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");
   add("--warm-iterations", warm_iterations, "Iterations of a frame started from the previous one");
   add("--warm-regressions", warm_regressions, "Plane regressions of such a frame");
-  add("--warm-precision", warm_precision, "Their precision, pixels");
   add("--best-sources", best_sources, "Cost = mean over this many best source views");
   add("--min-texture", min_texture, "Smallest standard deviation of a patch, grey levels of 255");
   add("--min-visible", min_visible, "Share of a patch that must be seen in the source");
@@ -144,6 +146,7 @@ Options MatchSettings::options() const {
   take(options.level_iterations, level_iterations);
   take(options.level_regressions, level_regressions);
   take(options.regression_radius, regression_radius);
+  take(options.regression_steps, regression_steps);
   take(options.regression_scale, regression_scale);
   take(options.regression_precision, regression_precision);
   take(options.vote_radius, vote_radius);
@@ -154,7 +157,6 @@ Options MatchSettings::options() const {
   take(options.source_planes, source_planes);
   take(options.warm_iterations, warm_iterations);
   take(options.warm_regressions, warm_regressions);
-  take(options.warm_precision, warm_precision);
   take(options.best_sources, best_sources);
   take(options.min_texture, min_texture);
   take(options.min_visible, min_visible);

@@ -25,9 +25,10 @@ struct MatchSettings {
       ambiguity_margin, far_preference;
   std::optional<int> vote_radius, repair_radius, fill_radius;
   std::optional<double> consistency_relative, consistency_pixels;
-  std::optional<int> levels, sweep_steps, regression_radius, warm_iterations, warm_regressions;
+  std::optional<int> levels, sweep_steps, regression_radius, regression_steps, warm_iterations,
+      warm_regressions;
   std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,
-      step_normal, warm_precision;
+      step_normal;
   std::optional<bool> source_planes;
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;

@@ -74,16 +74,17 @@ struct Options {
   int levels = 3;                                 ///< each half the size of the finer one, 1..4
   int sweep_steps = 64;                           ///< inverse distances tried at the coarsest level
   std::vector<int> level_iterations = {3, 2, 1};  ///< coarsest level first, one for each level
-  std::vector<int> level_regressions = {1, 1, 2};  ///< rounds of plane regression, likewise
-  int regression_radius = 36;    ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
-                                 ///< normals alone four times that
+  std::vector<int> level_regressions = {1, 1, 3};  ///< rounds of plane regression, likewise
+  int regression_radius = 64;    ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
+                                 ///< normals alone twice that
+  int regression_steps = 4;      ///< of the grid of neighbours that count, in its radius, 1..16
   double regression_scale = 12;  ///< intensity scale of the regression's weights, grey levels
-  /// A neighbourhood of a quarter or half the radius is taken where it determines the plane to this
-  /// standard deviation (source pixels, nominal: neighbours count as independent); > 0.
-  double regression_precision = 0.013;
+  /// A neighbourhood of an eighth, a quarter or half the radius is taken where it determines the
+  /// plane to this standard deviation (source pixels, nominal: neighbours count as independent);
+  /// > 0. Each further round of a level asks for 0.6 of the one before.
+  double regression_precision = 0.025;
   /// After each regression at full size, pixels that fail the checks take the plane of accepted
-  /// ones up to this many pixels away, as a new hypothesis (not in frames started from the one
-  /// before), 0..10000; 0 = none do.
+  /// ones up to this many pixels away, 0..10000; 0 = none do.
   int repair_radius = 32;
   /// After that, every pixel takes the plane which most of the planes up to this many pixels away
   /// agree with, 0..64; 0 = it keeps its own.
@@ -97,11 +98,10 @@ struct Options {
 
   /// Of a frame that starts from the previous one's planes (Matcher::match_next()).
   int warm_iterations = 8;  ///< of every view, all at full size, >= 0
-  /// SearchMethod::pyramid: rounds of plane regression, >= 0, and the precision (see
-  /// regression_precision) that ends each: less than a cold frame's, because frames average, too,
-  /// and neighbourhoods that overlap from frame to frame would spread across edges.
+  /// SearchMethod::pyramid: rounds of plane regression, >= 0. Fewer than a cold frame's, because
+  /// frames average, too, and neighbourhoods that overlap from frame to frame would spread across
+  /// edges.
   int warm_regressions = 1;
-  double warm_precision = 0.025;
 
   double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation
                              ///< carry no information

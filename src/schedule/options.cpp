@@ -49,14 +49,13 @@ Options Options::preset_named(const std::string& name) {
     options.pattern = PatchPattern::checkerboard;
     options.sweep_steps = 16;
     options.level_iterations = {2, 2, 2};
-    options.level_regressions = {1, 1, 2};
     options.source_planes = false;
     return options;
   }
   if (name == "quality") {
     options.sweep_steps = 128;
     options.level_iterations = {4, 3, 2};
-    options.level_regressions = {1, 2, 2};
+    options.regression_steps = 6;
     options.ambiguity_margin = 0.2;
     return options;
   }
@@ -93,13 +92,13 @@ void validate(const Options& o) {
     for (const int value : *values) require_between(value, 0, 1000, name);
   }
   require_between(o.regression_radius, 2, 64, "regression radius");
+  require_between(o.regression_steps, 1, 16, "regression steps");
   require_between(o.regression_scale, 0.1, 10000, "regression scale");
   require_between(o.regression_precision, 1e-6, 1000, "regression precision");
   require_between(o.step_pixels, 0, 1000, "step pixels");
   require_between(o.step_normal, 0, 2, "step normal");
   require_between(o.warm_iterations, 0, 100000, "warm iterations");
   require_between(o.warm_regressions, 0, 1000, "warm regressions");
-  require_between(o.warm_precision, 1e-6, 1000, "warm precision");
   require_between(o.min_texture, 0, 255, "min texture");
   require_between(o.min_visible, 0, 1, "min visible");
   require_between(o.consistency_relative, 0, 1000, "consistency (relative)");
@@ -130,6 +129,7 @@ std::string to_json(const Options& o) {
                                        {"level_iterations", o.level_iterations},
                                        {"level_regressions", o.level_regressions},
                                        {"regression_radius", o.regression_radius},
+                                       {"regression_steps", o.regression_steps},
                                        {"regression_scale", o.regression_scale},
                                        {"regression_precision", o.regression_precision},
                                        {"vote_radius", o.vote_radius},
@@ -147,7 +147,6 @@ std::string to_json(const Options& o) {
                                        {"best_sources", o.best_sources},
                                        {"warm_iterations", o.warm_iterations},
                                        {"warm_regressions", o.warm_regressions},
-                                       {"warm_precision", o.warm_precision},
                                        {"min_texture", o.min_texture},
                                        {"min_visible", o.min_visible},
                                        {"consistency_relative", o.consistency_relative},

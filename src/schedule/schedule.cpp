@@ -181,7 +181,7 @@ class Builder {
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) {
-          regress(view, level, options_.regression_precision, level == 0 ? until_vote() : 0);
+          regress(view, level, precision_of_round(i), level == 0 ? until_vote() : 0);
         }
         if (level > 0) continue;
         repair();
@@ -252,9 +252,9 @@ class Builder {
   }
 
   /// Little more than what corrects planes that are nearly right: the near strips, half of them for
-  /// each colour, carry surfaces into what has come into view, perturbations of distance follow what
-  /// moved, and random distances find what has come near; the regression then averages, and finds
-  /// the normals.
+  /// each colour, carry surfaces into what has come into view, perturbations of distance follow
+  /// what moved, and random distances find what has come near; the regression then averages, and
+  /// finds the normals.
   void search_warm() {
     constexpr unsigned perturbations = inverse_distance | random_distance;
     for (int i = 0; i < options_.warm_iterations; ++i) {
@@ -265,11 +265,11 @@ class Builder {
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
     for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
-    for (int i = 1; i <= options_.warm_regressions; ++i) {
+    for (int i = 0; i < options_.warm_regressions; ++i) {
       const unsigned how =
-          i == options_.warm_regressions ? regress_normals | until_vote() : adopt_unseen;
+          i + 1 == options_.warm_regressions ? regress_normals | until_vote() : adopt_unseen;
       for (const int view : views_of(0)) {
-        regress_measured(view, 0, options_.warm_precision, how);
+        regress_measured(view, 0, precision_of_round(i), how);
       }
     }
     repair();
@@ -327,6 +327,13 @@ class Builder {
     }
   }
 
+  /// What a neighbourhood must determine: more from round to round, as outliers vanish and
+  /// neighbours become smooth.
+  double precision_of_round(int i) const {
+    constexpr double share = 0.6;
+    return options_.regression_precision * std::pow(share, i);
+  }
+
   /// `precision`: 0 leaves the distances as they are. `how`: see shaders/regression.glsl.
   void regress(int view, int level, double precision, unsigned how) {
     add(Kernel::measure, pass_of(view), view, 0);
@@ -336,11 +343,12 @@ class Builder {
   void regress_measured(int view, int level, double precision, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
-    // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
-    // normals alone: a slope needs a wider base than a distance.
+    // A third at coarse levels, where a pixel covers more of the scene. Twice as much for normals
+    // alone: a slope needs a wider base than a distance.
     pass.steps =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
-    if (precision == 0) pass.steps *= 4;
+    if (precision == 0) pass.steps *= 2;
+    pass.neighbours = options_.regression_steps;
     pass.step_pixels = static_cast<float>(precision);
     pass.candidates = how;
     add(Kernel::regress, pass, view, 0);

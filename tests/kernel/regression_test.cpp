@@ -58,8 +58,9 @@ class Regression : public ::testing::Test {
   }
 
   /// m of the regressed plane; zero where there is none.
-  Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision) {
+  Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision, int steps = 4) {
     fixture_.pass().steps = radius;
+    fixture_.pass().neighbours = steps;
     fixture_.pass().step_pixels = static_cast<float>(precision);
     fixture_.pass().candidates = 0;
     kernel::cpu::regress_pixel(fixture_.context(), pixel);
@@ -102,6 +103,16 @@ TEST_F(Regression, IsAboutAsPreciseAsAskedFor) {
   EXPECT_LT(error(0.03), 1.5 * 0.03);
   EXPECT_LT(error(0.015), 1.5 * 0.015);
   EXPECT_GT(error(0.06), 1.5 * 0.015) << "a smaller neighbourhood is enough";
+}
+
+TEST_F(Regression, IsMorePreciseWithMoreNeighbours) {
+  measure([](int) { return wall; }, 0.1, 0.1);
+  const auto error = [&](int steps) {
+    return over_pixels(24, 72, [&](ivec2 pixel) {
+      return displacement(pixel, regressed(pixel, 12, 1e-6, steps), wall);
+    });
+  };
+  EXPECT_LT(error(6), 0.7 * error(3)) << "half as wrong with four times as many";
 }
 
 TEST_F(Regression, DoesNotBlendSurfaces) {
