@@ -176,7 +176,8 @@ class Builder {
       const int place = levels_ - 1 - level;
       for (int i = 0; i < options_.level_iterations[place]; ++i) {
         const bool first = i == 0 && level == levels_ - 1;
-        const unsigned candidates = cold_candidates(first);
+        const bool last = level == 0 && i + 1 == options_.level_iterations[place];
+        const unsigned candidates = cold_candidates(first, last);
         for (const int view : views_of(level)) search(view, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
@@ -305,9 +306,13 @@ class Builder {
     add(Kernel::sweep, pass, view, options_.sweep_steps);
   }
 
-  unsigned cold_candidates(bool first) const {
-    unsigned candidates = strips | inverse_distance | both | surroundings;
-    if (options_.pattern == PatchPattern::dense) candidates |= normal;
+  unsigned cold_candidates(bool first, bool last) const {
+    unsigned candidates = strips | surroundings;
+    // The last iteration spreads planes alone: the regression does what perturbations would.
+    if (!last || options_.level_regressions.back() == 0) {
+      candidates |= inverse_distance | both;
+      if (options_.pattern == PatchPattern::dense) candidates |= normal;
+    }
     if (first) candidates |= random_distance;
     if (options_.source_planes && !first) candidates |= source_planes;
     return candidates;
@@ -331,7 +336,8 @@ class Builder {
   /// neighbours become smooth.
   double precision_of_round(int i) const {
     constexpr double share = 0.6;
-    return options_.regression_precision * std::pow(share, i);
+    constexpr double finest = 1e-6;  // always the whole neighbourhood; 0 would mean normals alone
+    return std::max(options_.regression_precision * std::pow(share, i), finest);
   }
 
   /// `precision`: 0 leaves the distances as they are. `how`: see shaders/regression.glsl.
