@@ -75,8 +75,8 @@ struct Options {
   int sweep_steps = 64;                           ///< inverse distances tried at the coarsest level
   std::vector<int> level_iterations = {3, 2, 1};  ///< coarsest level first, one for each level
   std::vector<int> level_regressions = {1, 1, 3};  ///< rounds of plane regression, likewise
-  int regression_radius = 64;    ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
-                                 ///< normals alone twice that
+  int regression_radius = 40;    ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
+                                 ///< normals alone four times that
   int regression_steps = 4;      ///< of the grid of neighbours that count, in its radius, 1..16
   double regression_scale = 12;  ///< intensity scale of the regression's weights, grey levels
   /// A neighbourhood of an eighth, a quarter or half the radius is taken where it determines the

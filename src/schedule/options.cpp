@@ -55,6 +55,7 @@ Options Options::preset_named(const std::string& name) {
   if (name == "quality") {
     options.sweep_steps = 128;
     options.level_iterations = {4, 3, 2};
+    options.regression_radius = 64;
     options.regression_steps = 6;
     options.ambiguity_margin = 0.2;
     return options;

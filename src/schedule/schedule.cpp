@@ -349,11 +349,11 @@ class Builder {
   void regress_measured(int view, int level, double precision, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
-    // A third at coarse levels, where a pixel covers more of the scene. Twice as much for normals
-    // alone: a slope needs a wider base than a distance.
+    // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
+    // normals alone: a slope needs a wider base than a distance.
     pass.steps =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
-    if (precision == 0) pass.steps *= 2;
+    if (precision == 0) pass.steps *= 4;
     pass.neighbours = options_.regression_steps;
     pass.step_pixels = static_cast<float>(precision);
     pass.candidates = how;
