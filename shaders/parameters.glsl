@@ -42,8 +42,8 @@ struct PassParameters {
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
-  uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS;
-                    // adopting: ADOPT_UNSEEN; filling: reasons not to fill
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried; measuring: SUBPIXEL_MATCH;
+                    // regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN; filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
                       // regression: standard deviation (px) that is enough; 0: normals only
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates

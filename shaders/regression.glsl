@@ -10,6 +10,12 @@
 #define LARGEST_RESIDUAL 0.6f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
+// Largest shift (px) that a sub-pixel match may find.
+#define LARGEST_SHIFT 0.5f
+// Variance (px^2) of a match that gets half the shift found.
+#define HALF_SHIFT_VARIANCE 0.01f
+// Smallest gain between a source's intensities and the reference's that a sub-pixel match believes.
+#define SMALLEST_GAIN 0.2f
 // Rounds for distances, the last two over the whole radius, the others over an eighth, a quarter and a half of it.
 #define REGRESSION_ROUNDS 5
 #define WHOLE_RADIUS_ROUND 3
@@ -17,7 +23,8 @@
 #define NORMAL_ROUNDS 4
 // Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
 #define LARGEST_SLOPE_CHANGE 6.0f
-// Bits of PASS.candidates: see regress_plane() and adopt_pixel().
+// Bits of PASS.candidates: see measure_pixel(), regress_plane() and adopt_pixel().
+#define SUBPIXEL_MATCH 1u
 #define REGRESS_NORMALS 1u
 #define ADOPT_UNSEEN 2u
 // First random slot; the search uses lower ones.
@@ -48,10 +55,82 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
          vec2(jy.y * along.x - jy.x * along.y, jx.x * along.y - jx.y * along.x);
 }
 
+// Change of the reference's intensity at q per pixel of displacement in the source; false where it is not seen.
+FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) slope) {
+  float left = intensity_at(CONTEXT PASS.reference, ivec2(q.x - 1, q.y));
+  float right = intensity_at(CONTEXT PASS.reference, ivec2(q.x + 1, q.y));
+  float up = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y - 1));
+  float down = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y + 1));
+  slope = 0.5f * ((right - left) * direction.x + (down - up) * direction.y);
+  return min(min(left, right), min(up, down)) >= 0.0f;
+}
+
+// How far (px, along the source's curve) the plane's patch lies from where it matches best, by one step of least
+// squares: the source's intensities are gain (a + shift slope) + offset. Zero where that tells nothing.
+FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 direction) {
+  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  int model = model_of(CONTEXT camera);
+  vec2 centre;
+  if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return 0.0f;
+  float centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
+  float centre_a = intensity_at(CONTEXT PASS.reference, pixel);
+  PatchMap map;
+  if (centre_b < 0.0f || !map_patch(CONTEXT pair, camera, model, m, pixel, centre, map)) return 0.0f;
+  map.u0 = texel_at(map.u0, FILTER);
+  float n = 0.0f;
+  float sum_a = 0.0f;
+  float sum_b = 0.0f;
+  float sum_s = 0.0f;
+  float sum_aa = 0.0f;
+  float sum_ab = 0.0f;
+  float sum_as = 0.0f;
+  float sum_bs = 0.0f;
+  float sum_ss = 0.0f;
+  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    int first = first_column(CONTEXT dy);
+    RowMap row = map_row(CONTEXT map, float(first), float(dy));
+    for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
+      ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
+      float a = intensity_at(CONTEXT PASS.reference, q);
+      float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
+      float slope;
+      if (!slope_at(CONTEXT q, direction, slope) || min(a, b) < 0.0f) continue;
+      a -= centre_a;
+      b -= centre_b;
+      float weight = sample_weight(CONTEXT a, PARAMETERS.support.x);
+      n += weight;
+      sum_a += weight * a;
+      sum_b += weight * b;
+      sum_s += weight * slope;
+      sum_aa += weight * a * a;
+      sum_ab += weight * a * b;
+      sum_as += weight * a * slope;
+      sum_bs += weight * b * slope;
+      sum_ss += weight * slope * slope;
+    }
+  }
+  if (!(n > 0.0f)) return 0.0f;
+  float aa = sum_aa - sum_a * sum_a / n;
+  float ab = sum_ab - sum_a * sum_b / n;
+  float as = sum_as - sum_a * sum_s / n;
+  float bs = sum_bs - sum_b * sum_s / n;
+  float ss = sum_ss - sum_s * sum_s / n;
+  float determinant = aa * ss - as * as;
+  // Along the curve the patch must look like more than a change of its contrast.
+  if (!(determinant > 0.02f * aa * ss)) return 0.0f;
+  // Both unknowns times the determinant.
+  float gain = ss * ab - as * bs;
+  float gain_times_shift = aa * bs - as * ab;
+  if (gain < SMALLEST_GAIN * determinant) return 0.0f;
+  return clamp(gain_times_shift / gain, -LARGEST_SHIFT, LARGEST_SHIFT);
+}
+
 // Stores all that regress_pixel() needs of a neighbour: the variance of its match along the epipolar curve (px^2), the
 // speed there (pixels per unit of inverse distance), its inverse distance and intensity. The variance is that of the
 // patch's residual over the information of its gradients, and the square of half the displacement from the
-// source's own plane, which exposes what the patch itself cannot tell.
+// source's own plane, which exposes what the patch itself cannot tell. With SUBPIXEL_MATCH the inverse distance is
+// where the patch matches best instead of where the search has left it.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -61,6 +140,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float centre = intensity_at(CONTEXT PASS.reference, pixel);
   float speed = 0.0f;
   float variance = UNMEASURED_VARIANCE;
+  float w = inverse_distance_of(held, ray);
   if (is_usable(CONTEXT pixel, usable_ray) && correlation > 0.05f) {
     vec2 velocity;
     int source = telling_source(CONTEXT ray, dot(m, ray), velocity);
@@ -75,14 +155,10 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         float a = intensity_at(CONTEXT PASS.reference, q);
-        float left = intensity_at(CONTEXT PASS.reference, ivec2(q.x - 1, q.y));
-        float right = intensity_at(CONTEXT PASS.reference, ivec2(q.x + 1, q.y));
-        float up = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y - 1));
-        float down = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y + 1));
-        if (min(min(a, min(left, right)), min(up, down)) < 0.0f) continue;
+        float slope;
+        if (!slope_at(CONTEXT q, direction, slope) || a < 0.0f) continue;
         a -= centre;
         float weight = sample_weight(CONTEXT a, PARAMETERS.support.x);
-        float slope = 0.5f * ((right - left) * direction.x + (down - up) * direction.y);
         information += weight * slope * slope;
         n += weight;
         sum += weight * a;
@@ -99,9 +175,14 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
                                                              : UNCHECKED_DISPLACEMENT;
       variance = min(residual / information + SMALLEST_VARIANCE + 0.25f * displacement * displacement,
                      UNMEASURED_VARIANCE);
+      if ((PASS.candidates & SUBPIXEL_MATCH) != 0u) {
+        // What a precise patch still asks for is less its noise than a second surface in it.
+        float share = variance / (variance + HALF_SHIFT_VARIANCE);
+        w -= share * subpixel_shift(CONTEXT source, pixel, m, direction) / speed;
+      }
     }
   }
-  store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, inverse_distance_of(held, ray), centre));
+  store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, w, centre));
 }
 
 // Inverse distance relative to the pixel's tangent plane: offset + slope_x x + slope_y y.

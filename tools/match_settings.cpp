@@ -91,6 +91,8 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--regression-precision", regression_precision,
       "Precision that lets the regression do with a smaller neighbourhood, pixels; falls from "
       "round to round");
+  add("--subpixel-match", subpixel_match,
+      "The first regression of a level averages sub-pixel matches: true or false");
   add("--repair-radius", repair_radius,
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
   add("--vote-radius", vote_radius,
@@ -149,6 +151,7 @@ Options MatchSettings::options() const {
   take(options.regression_steps, regression_steps);
   take(options.regression_scale, regression_scale);
   take(options.regression_precision, regression_precision);
+  take(options.subpixel_match, subpixel_match);
   take(options.vote_radius, vote_radius);
   take(options.repair_radius, repair_radius);
   take(options.far_preference, far_preference);

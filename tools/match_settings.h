@@ -29,7 +29,7 @@ struct MatchSettings {
       warm_regressions;
   std::optional<double> weight_scale, regression_scale, regression_precision, step_pixels,
       step_normal;
-  std::optional<bool> source_planes;
+  std::optional<bool> subpixel_match, source_planes;
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;
   std::optional<widestereo::PatchWarp> warp;

@@ -83,6 +83,9 @@ struct Options {
   /// plane to this standard deviation (source pixels, nominal: neighbours count as independent);
   /// > 0. Each further round of a level asks for 0.6 of the one before.
   double regression_precision = 0.025;
+  /// The first regression of a level averages what neighbours' patches match best, to sub-pixel
+  /// accuracy by least squares, instead of where the search has left them.
+  bool subpixel_match = true;
   /// After each regression at full size, pixels that fail the checks take the plane of accepted
   /// ones up to this many pixels away, 0..10000; 0 = none do.
   int repair_radius = 32;

@@ -133,6 +133,7 @@ std::string to_json(const Options& o) {
                                        {"regression_steps", o.regression_steps},
                                        {"regression_scale", o.regression_scale},
                                        {"regression_precision", o.regression_precision},
+                                       {"subpixel_match", o.subpixel_match},
                                        {"vote_radius", o.vote_radius},
                                        {"repair_radius", o.repair_radius},
                                        {"far_preference", o.far_preference},

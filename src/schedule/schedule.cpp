@@ -93,6 +93,7 @@ constexpr unsigned surroundings = 1u << 12;
 constexpr unsigned source_planes = 1u << 13;
 constexpr unsigned normal = 1u << 9;
 // Of shaders/regression.glsl.
+constexpr unsigned subpixel_match = 1;
 constexpr unsigned regress_normals = 1;
 constexpr unsigned adopt_unseen = 2;
 
@@ -175,13 +176,13 @@ class Builder {
       }
       const int place = levels_ - 1 - level;
       for (int i = 0; i < options_.level_iterations[place]; ++i) {
-        const bool first = i == 0 && level == levels_ - 1;
         const bool last = level == 0 && i + 1 == options_.level_iterations[place];
-        const unsigned candidates = cold_candidates(first, last);
+        const unsigned candidates = cold_candidates(level == levels_ - 1, i == 0, last);
         for (const int view : views_of(level)) search(view, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) {
+          measure(view, i == 0 && options_.subpixel_match ? subpixel_match : 0);
           regress(view, level, precision_of_round(i), level == 0 ? until_vote() : 0);
         }
         if (level > 0) continue;
@@ -190,7 +191,10 @@ class Builder {
       }
     }
     if (options_.level_regressions.back() > 0) {
-      for (const int view : views_of(0)) regress(view, 0, 0, 0);
+      for (const int view : views_of(0)) {
+        measure(view, 0);
+        regress(view, 0, 0, 0);
+      }
     }
   }
 
@@ -265,12 +269,12 @@ class Builder {
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
-    for (const int view : views_of(0)) add(Kernel::measure, pass_of(view), view, 0);
+    for (const int view : views_of(0)) measure(view, 0);
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const unsigned how =
           i + 1 == options_.warm_regressions ? regress_normals | until_vote() : adopt_unseen;
       for (const int view : views_of(0)) {
-        regress_measured(view, 0, precision_of_round(i), how);
+        regress(view, 0, precision_of_round(i), how);
       }
     }
     repair();
@@ -306,15 +310,19 @@ class Builder {
     add(Kernel::sweep, pass, view, options_.sweep_steps);
   }
 
-  unsigned cold_candidates(bool first, bool last) const {
+  /// `first`: of the level; `last`: of all.
+  unsigned cold_candidates(bool coarsest, bool first, bool last) const {
     unsigned candidates = strips | surroundings;
     // The last iteration spreads planes alone: the regression does what perturbations would.
     if (!last || options_.level_regressions.back() == 0) {
-      candidates |= inverse_distance | both;
-      if (options_.pattern == PatchPattern::dense) candidates |= normal;
+      candidates |= inverse_distance;
+      // Normals found there are spread, and regressed, at the finer levels.
+      if (coarsest) candidates |= both;
+      if (coarsest && options_.pattern == PatchPattern::dense) candidates |= normal;
     }
-    if (first) candidates |= random_distance;
-    if (options_.source_planes && !first) candidates |= source_planes;
+    const bool first_of_all = coarsest && first;
+    if (first_of_all) candidates |= random_distance;
+    if (options_.source_planes && !first_of_all) candidates |= source_planes;
     return candidates;
   }
 
@@ -340,13 +348,16 @@ class Builder {
     return std::max(options_.regression_precision * std::pow(share, i), finest);
   }
 
-  /// `precision`: 0 leaves the distances as they are. `how`: see shaders/regression.glsl.
-  void regress(int view, int level, double precision, unsigned how) {
-    add(Kernel::measure, pass_of(view), view, 0);
-    regress_measured(view, level, precision, how);
+  /// `how` of measure() and regress(): see shaders/regression.glsl.
+  void measure(int view, unsigned how) {
+    kernel::PassParameters pass = pass_of(view);
+    pass.candidates = how;
+    // A sub-pixel match looks at one source, but counts as if it looked at all.
+    add(Kernel::measure, pass, view, (how & subpixel_match) != 0 ? 1 : 0);
   }
 
-  void regress_measured(int view, int level, double precision, unsigned how) {
+  /// The view must have been measured. `precision`: 0 leaves the distances as they are.
+  void regress(int view, int level, double precision, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene. Four times as much for

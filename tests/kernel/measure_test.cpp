@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+// Measures of planes held nearly right, on rendered images of a slanted plane.
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "kernel_fixture.h"
+#include "widestereo/synthesis.h"
+
+namespace widestereo::test {
+namespace {
+
+constexpr int size = 128;
+constexpr int step = 3;
+
+class Measure : public ::testing::Test {
+ protected:
+  Measure() : fixture_(fisheye_rig(size), wide_range("fast")) {
+    const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+    const double offset = 2;
+    wall_ = normal / offset;
+    const RenderedPair pair = render_plane(fixture_.rig(), normal, offset);
+    for (int i = 0; i < 2; ++i) {
+      cv::Mat grey;
+      cv::cvtColor(pair.views[i].image, grey, cv::COLOR_BGR2GRAY);
+      grey.convertTo(grey, CV_32FC1, 1.0 / 255);
+      cv::Mat image = fixture_.view(i).image();
+      grey.copyTo(image, image >= 0);  // masked pixels stay masked
+      fixture_.view(i).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
+    }
+    fixture_.set_reference(0);
+  }
+
+  /// Replaces the source's intensities b by gain b + offset.
+  void change_exposure(double gain, double offset) {
+    cv::Mat image = fixture_.view(1).image();
+    const cv::Mat masked = image < 0;
+    image.convertTo(image, -1, gain, offset);
+    image.setTo(MASKED_INTENSITY, masked);
+  }
+
+  struct Displacement {
+    double held = 0;
+    double measured = 0;
+  };
+
+  /// Over the middle of the image: pixels in the source between the wall and where the held plane,
+  /// `held` off, and its measure put the point.
+  std::vector<Displacement> measured(double held, unsigned how) {
+    std::vector<Displacement> all;
+    for (int y = 24; y < size - 24; y += step) {
+      for (int x = 24; x < size - 24; x += step) {
+        const cv::Vec4f r = fixture_.view(0).rays(y, x);
+        const Eigen::Vector3d ray(r[0], r[1], r[2]);
+        const auto measure = [&](const Eigen::Vector3d& m) {
+          const Eigen::Vector3f single = m.cast<float>();
+          fixture_.view(0).hypotheses(y, x) = cv::Vec4f(single.x(), single.y(), single.z(), 0.1f);
+          kernel::cpu::measure_pixel(fixture_.context(), {x, y});
+          return fixture_.view(0).checks(y, x);
+        };
+        fixture_.pass().candidates = 0;
+        const double speed = measure(wall_)[1];
+        if (speed <= 0) continue;
+        fixture_.pass().candidates = how;
+        const cv::Vec4f check = measure(wall_ + held / speed * ray);
+        all.push_back({held, (static_cast<double>(check[2]) - wall_.dot(ray)) * speed});
+      }
+    }
+    return all;
+  }
+
+  static double root_mean_square(const std::vector<Displacement>& all) {
+    double sum = 0;
+    for (const Displacement& d : all) sum += d.measured * d.measured;
+    return std::sqrt(sum / static_cast<double>(all.size()));
+  }
+
+  KernelFixture fixture_;
+  Eigen::Vector3d wall_;  ///< m of the plane that is seen
+};
+
+TEST_F(Measure, SubpixelMatchFindsWherePatchesMatch) {
+  change_exposure(0.6, 0.1);
+  for (const double held : {-0.3, 0.15, 0.3}) {
+    const auto as_held = measured(held, 0);
+    const auto matched = measured(held, SUBPIXEL_MATCH);
+    ASSERT_GT(matched.size(), 500u);
+    EXPECT_NEAR(root_mean_square(as_held), std::abs(held), 0.01);
+    EXPECT_LT(root_mean_square(matched), 0.08) << "held " << held << " px off";
+  }
+}
+
+TEST_F(Measure, SubpixelMatchNeedsEvidence) {
+  change_exposure(-0.6, 0.9);
+  EXPECT_NEAR(root_mean_square(measured(0.3, SUBPIXEL_MATCH)), 0.3, 0.01) << "a negative";
+  for (int i = 0; i < 2; ++i) {
+    cv::Mat image = fixture_.view(i).image();
+    image.setTo(0.5, image >= 0);
+  }
+  EXPECT_NEAR(root_mean_square(measured(0.3, SUBPIXEL_MATCH)), 0.3, 0.01) << "no texture";
+}
+
+TEST_F(Measure, SubpixelMatchMovesNoFurtherThanAPatchCanTell) {
+  const auto matched = measured(3, SUBPIXEL_MATCH);
+  for (const Displacement& d : matched)
+    EXPECT_NEAR(d.measured, 3, static_cast<double>(LARGEST_SHIFT) + 0.1);
+}
+
+}  // namespace
+}  // namespace widestereo::test
