@@ -87,14 +87,14 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   return vec2(supporting * share, evidence * share);
 }
 
-// Whether the patch matches better by more than the margin at one of PASS.steps places: 2, 4, 8 ... source
+// Whether the patch matches better by more than the margin at one of PASS.places places: 2, 4, 8 ... source
 // pixels away to either side.
 FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float speed) {
   float margin = PARAMETERS.support.z;
   if (speed <= 0.0f) return false;
   vec3 m = vec3(held.x, held.y, held.z);
   float w = dot(m, ray);
-  for (int i = 0; i < PASS.steps; ++i) {
+  for (int i = 0; i < PASS.places; ++i) {
     float pixels = float(2 << (i >> 1));
     float there = w + ((i & 1) == 0 ? pixels : -pixels) / speed;
     if (there < PARAMETERS.range.z || there > PARAMETERS.range.w) continue;

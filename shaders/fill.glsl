@@ -23,7 +23,7 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int dx = i % 3 - 1;
     int dy = i / 3 - 1;
     if (dx == 0 && dy == 0) continue;
-    int reach = dx == 0 || dy == 0 ? PASS.steps : PASS.steps * 7 / 10;
+    int reach = dx == 0 || dy == 0 ? PASS.radius : PASS.radius * 7 / 10;
     for (int k = 1; k <= reach; ++k) {
       ivec2 q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
       if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) break;

@@ -38,14 +38,16 @@ struct PassParameters {
   int other;       // the one view that a transfer or a change of level reads from
   int iteration;   // counts over the whole schedule of this view
   int colour;      // 0, 1: checkerboard; -1: all pixels
-  int neighbours;  // bits: left, right, up, down; regression: steps of its grid of neighbours in the radius
+  int neighbours;  // bits: left, right, up, down
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; measuring: SUBPIXEL_MATCH;
                     // regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN; filling: reasons not to fill
-  float step_pixels;  // adaptive search: largest displacement of a perturbation in the source;
-                      // regression: standard deviation (px) that is enough; 0: normals only
+  float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
-  int steps;          // sweep: inverse distances; regression, vote, filling: radius in pixels; check: other places
+  int radius;         // regression, vote, filling: pixels
+  int steps;          // sweep: inverse distances; regression: of its grid of neighbours, in the radius
+  float deviation;    // regression: standard deviation (source pixels) that is enough; 0: normals only
+  int places;         // check: other places tried for a better match
 };

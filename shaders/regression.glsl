@@ -207,7 +207,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float fall_off = 2.0f / float(radius * radius);
-  int step = max(radius / PASS.neighbours, 1);
+  int step = max(radius / PASS.steps, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;
@@ -274,7 +274,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   return true;
 }
 
-// The plane of the smallest neighbourhood that determines its offset to PASS.step_pixels. With REGRESS_NORMALS
+// The plane of the smallest neighbourhood that determines its offset to PASS.deviation. With REGRESS_NORMALS
 // the whole neighbourhood gives the slopes.
 FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
                       INOUT(LocalPlane) plane) {
@@ -285,13 +285,13 @@ FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 so
   for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
     // What has its offset needs but one more round for its slopes.
     if (determined && round < REGRESSION_ROUNDS - 1) continue;
-    int radius = max(PASS.steps >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
+    int radius = max(PASS.radius >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
     PlaneFit fit;
     if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
     plane = fit.plane;
     found = true;
     if (!determined) offset = plane.offset;
-    if (fit.certainty * PASS.step_pixels * PASS.step_pixels > own.y * own.y) determined = true;
+    if (fit.certainty * PASS.deviation * PASS.deviation > own.y * own.y) determined = true;
     if (determined && !normals) break;
   }
   plane.offset = offset;
@@ -306,7 +306,7 @@ FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 s
   float offset = plane.offset;
   PlaneFit first;
   for (int round = 0; round < NORMAL_ROUNDS; ++round) {
-    int radius = round == 0 ? PASS.steps / 8 : (round < NORMAL_ROUNDS - 1 ? PASS.steps / 2 : PASS.steps);
+    int radius = round == 0 ? PASS.radius / 8 : (round < NORMAL_ROUNDS - 1 ? PASS.radius / 2 : PASS.radius);
     PlaneFit fit;
     if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, max(radius, 2), plane, fit)) continue;
     if (!found) first = fit;
@@ -321,7 +321,7 @@ FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 s
   return found;
 }
 
-// Stores the regressed plane (m, 1) as the pixel's prior, zero where there is none. Without PASS.step_pixels the
+// Stores the regressed plane (m, 1) as the pixel's prior, zero where there is none. Without PASS.deviation the
 // pixel keeps its distance and gets a normal alone.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
@@ -339,7 +339,7 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.slope_x = dot(m, east) / TANGENT_SCALE;
     plane.slope_y = dot(m, south) / TANGENT_SCALE;
     vec4 own = check_at(CONTEXT PASS.reference, pixel);
-    bool found = PASS.step_pixels > 0.0f ? regress_plane(CONTEXT pixel, ray, east, south, own, plane)
+    bool found = PASS.deviation > 0.0f ? regress_plane(CONTEXT pixel, ray, east, south, own, plane)
                                          : regress_slopes(CONTEXT pixel, ray, east, south, own, plane);
     vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
                      (TANGENT_SCALE * plane.slope_y) * south;

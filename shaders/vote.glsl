@@ -15,7 +15,7 @@
 
 // The pixel whose plane is candidate i.
 FN ivec2 vote_candidate_at(CONTEXT_ARGUMENT ivec2 pixel, int i) {
-  int reach = i < VOTE_CANDIDATES / 2 ? PASS.steps / 2 : PASS.steps;
+  int reach = i < VOTE_CANDIDATES / 2 ? PASS.radius / 2 : PASS.radius;
   int k = i % (VOTE_CANDIDATES / 2);
   if (k >= 4) ++k;
   return ivec2(pixel.x + (k % 3 - 1) * reach, pixel.y + (k / 3 - 1) * reach);
@@ -53,14 +53,14 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       if (differs && plane.w < INVALID_COST && admissible(CONTEXT ray, m)) candidates[i] = dot(m, ray);
     }
     float intensity = intensity_at(CONTEXT PASS.reference, pixel);
-    float fall_off = 1.0f / float(PASS.steps * PASS.steps);
+    float fall_off = 1.0f / float(PASS.radius * PASS.radius);
     float most = 0.0f;
     // Every pixel asks others, so that neighbours do not all make the same mistake.
     vec4 u = draw4(CONTEXT pixel, VOTE_SLOT);
-    int first_x = int(u.x * float(VOTE_STEP)) - PASS.steps;
-    int first_y = int(u.y * float(VOTE_STEP)) - PASS.steps;
-    for (int dy = first_y; dy <= PASS.steps; dy += VOTE_STEP) {
-      for (int dx = first_x; dx <= PASS.steps; dx += VOTE_STEP) {
+    int first_x = int(u.x * float(VOTE_STEP)) - PASS.radius;
+    int first_y = int(u.y * float(VOTE_STEP)) - PASS.radius;
+    for (int dy = first_y; dy <= PASS.radius; dy += VOTE_STEP) {
+      for (int dx = first_x; dx <= PASS.radius; dx += VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         if (!in_image(size, q)) continue;
         vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);

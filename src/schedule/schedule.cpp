@@ -25,7 +25,7 @@ static_assert(sizeof(kernel::ViewPair) == 48);
 static_assert(offsetof(kernel::MatchParameters, cameras) == 96);
 static_assert(offsetof(kernel::MatchParameters, pairs) == 96 + 80 * MAX_VIEWS);
 static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
-static_assert(sizeof(kernel::PassParameters) == 52);
+static_assert(sizeof(kernel::PassParameters) == 64);
 
 kernel::ViewPair view_pair(const Eigen::Isometry3d& source_from_reference) {
   const Eigen::Matrix<float, 3, 4> t = source_from_reference.matrix().topRows<3>().cast<float>();
@@ -362,11 +362,11 @@ class Builder {
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
     // normals alone: a slope needs a wider base than a distance.
-    pass.steps =
+    pass.radius =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
-    if (precision == 0) pass.steps *= 4;
-    pass.neighbours = options_.regression_steps;
-    pass.step_pixels = static_cast<float>(precision);
+    if (precision == 0) pass.radius *= 4;
+    pass.steps = options_.regression_steps;
+    pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
     add(Kernel::regress, pass, view, 0);
     add(Kernel::adopt, pass, view, (how & adopt_unseen) != 0 ? 0 : 1);
@@ -380,7 +380,7 @@ class Builder {
     for (const int view : views_of(0)) {
       kernel::PassParameters pass = pass_of(view);
       pass.iteration = regressions_;
-      pass.steps = options_.vote_radius;
+      pass.radius = options_.vote_radius;
       add(Kernel::vote, pass, view, 0);
       add(Kernel::adopt, pass, view, 1);
     }
@@ -390,13 +390,13 @@ class Builder {
   void check_and_fill(int places, int fill_radius, unsigned reasons_not_to_fill) {
     for (const int view : views_of(0)) {
       kernel::PassParameters pass = pass_of(view);
-      pass.steps = places;
+      pass.places = places;
       add(Kernel::check, pass, view, places);
     }
     if (fill_radius == 0) return;
     for (const int view : views_of(0)) {
       kernel::PassParameters pass = pass_of(view);
-      pass.steps = fill_radius;
+      pass.radius = fill_radius;
       pass.candidates = reasons_not_to_fill;
       add(Kernel::fill, pass, view, 0);
       add(Kernel::adopt_fill, pass, view, 1);

@@ -314,7 +314,7 @@ TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   Options options = wide_range();
   options.ambiguity_margin = 0.2;
   AgreeingViews views(options);
-  views.fixture.pass().steps = 6;
+  views.fixture.pass().places = 6;
   const auto check_at_cost = [&](double cost) {
     const vec3 m = views.plane(0);
     views.fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, cost));
@@ -323,7 +323,7 @@ TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   // Unrelated images: some other place always matches much better than the worst cost.
   EXPECT_NE(check_at_cost(1.9), 0);
   EXPECT_EQ(check_at_cost(0.1), 0);
-  views.fixture.pass().steps = 0;
+  views.fixture.pass().places = 0;
   EXPECT_EQ(check_at_cost(1.9), 0) << "not asked for";
 }
 
@@ -341,7 +341,7 @@ TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
   between.setTo(cv::Scalar(2 * m.x, 2 * m.y, 2 * m.z, 0.3));
   fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0.9, 0));
   fixture.view(0).checks.colRange(44, 50).setTo(cv::Scalar(0.5, 9, 0.1, REASON_INCONSISTENT));
-  fixture.pass().steps = options.fill_radius;
+  fixture.pass().radius = options.fill_radius;
   fixture.pass().candidates = REASON_NO_RAY;
   const auto fill = [&](ivec2 pixel) {
     kernel::cpu::fill_pixel(fixture.context(), pixel);

@@ -59,9 +59,9 @@ class Regression : public ::testing::Test {
 
   /// m of the regressed plane; zero where there is none.
   Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision, int steps = 4) {
-    fixture_.pass().steps = radius;
-    fixture_.pass().neighbours = steps;
-    fixture_.pass().step_pixels = static_cast<float>(precision);
+    fixture_.pass().radius = radius;
+    fixture_.pass().steps = steps;
+    fixture_.pass().deviation = static_cast<float>(precision);
     fixture_.pass().candidates = 0;
     kernel::cpu::regress_pixel(fixture_.context(), pixel);
     const cv::Vec4f prior = fixture_.view(0).priors(pixel.y, pixel.x);

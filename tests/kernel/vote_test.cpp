@@ -21,7 +21,7 @@ class Vote : public ::testing::Test {
  protected:
   Vote() : fixture_(fisheye_rig(size), wide_range("fast")) {
     fixture_.set_reference(0);
-    fixture_.pass().steps = 8;
+    fixture_.pass().radius = 8;
     fill(0, size, dark, far_plane);
     fill(0, edge, bright, near_plane);
   }
