@@ -31,8 +31,7 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
       vec3 m = vec3(held.x, held.y, held.z);
       if (!admissible(CONTEXT ray, m)) break;
-      float unlike = abs(intensity_at(CONTEXT PASS.reference, q) - intensity);
-      float weight = 1.0f / growth(unlike * PARAMETERS.support.y);
+      float weight = 1.0f / unlikeness(CONTEXT intensity_at(CONTEXT PASS.reference, q), intensity);
       int place = count;
       while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
         planes[place] = planes[place - 1];

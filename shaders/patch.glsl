@@ -194,6 +194,9 @@ FN float growth(float a) {
   return t * t;
 }
 
+// From 1 on, how unlike two intensities of the reference are: pixels of one surface mostly are alike.
+FN float unlikeness(CONTEXT_ARGUMENT float a, float b) { return growth(abs(a - b) * PARAMETERS.support.y); }
+
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
 // which loops read once. Zero for masked samples; others differ by 1 at most.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {

@@ -240,7 +240,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float doubt = 1.0f + residual * residual / scale2;
       float weight = measure.y * measure.y /
                      (measure.x * doubt * doubt * growth(float(dx * dx + dy * dy) * fall_off) *
-                      growth(abs(measure.w - own.w) * PARAMETERS.support.y));
+                      unlikeness(CONTEXT measure.w, own.w));
       s += weight;
       sx += weight * x;
       sy += weight * y;

@@ -66,9 +66,8 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
         if (plane.w >= INVALID_COST) continue;
         float w = inverse_distance_of(plane, ray);
-        float unlike = abs(intensity_at(CONTEXT PASS.reference, q) - intensity);
         float weight = 1.0f / (growth(float(dx * dx + dy * dy) * fall_off) *
-                               growth(unlike * PARAMETERS.support.y));
+                               unlikeness(CONTEXT intensity_at(CONTEXT PASS.reference, q), intensity));
         most += weight * support_between(w, own, scale);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
           support[i] += weight * support_between(w, candidates[i], scale);

@@ -11,6 +11,7 @@
 
 #include "geometry/camera_parameters.h"
 #include "geometry/dual.h"
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 
 namespace widestereo::kernel::dual {
@@ -276,12 +277,7 @@ Camera resized(const Camera& camera, int width, int height) {
 
 cv::Mat ray_image(const Camera& camera, const cv::Mat& mask) {
   validate(camera, "The camera of the ray image");
-  if (!mask.empty() &&
-      (mask.type() != CV_8UC1 || mask.cols != camera.width || mask.rows != camera.height)) {
-    throw Error("The mask of the ray image is " + size_text(mask.cols, mask.rows) +
-                " pixels, but the camera has " + size_text(camera.width, camera.height) +
-                "; use an 8-bit grey mask of that size.");
-  }
+  require_fitting_mask(mask, camera, "The ray image");
   Camera whole = camera;
   whole.max_theta = std::numbers::pi;
   const kernel::precise::CameraParameters model = camera_parameters(whole);

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "geometry/validation.h"
+
 #include <Eigen/Dense>
 #include <array>
 #include <cmath>
@@ -97,19 +99,22 @@ void validate(const Camera& c, const std::string& name) {
   }
 }
 
+void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name) {
+  if (mask.empty()) return;
+  if (mask.type() == CV_8UC1 && mask.cols == camera.width && mask.rows == camera.height) return;
+  throw Error(name + ": the mask is " + std::to_string(mask.cols) + "x" +
+              std::to_string(mask.rows) + " pixels, but the camera has " +
+              std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+              "; use an 8-bit grey mask of that size.");
+}
+
 void validate(const Rig& rig, const std::string& name) {
   if (rig.views.empty()) throw Error(name + " has no cameras.");
   for (const View& view : rig.views) {
     const std::string of_view = name + ": " + view.name;
     validate(view.camera, of_view);
     require_rigid(view.world_from_camera, of_view);
-    if (!view.mask.empty() && (view.mask.type() != CV_8UC1 || view.mask.cols != view.camera.width ||
-                               view.mask.rows != view.camera.height)) {
-      throw Error(of_view + ": the mask is " + std::to_string(view.mask.cols) + "x" +
-                  std::to_string(view.mask.rows) + " pixels, but the camera has " +
-                  std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) +
-                  "; use an 8-bit grey mask of that size.");
-    }
+    require_fitting_mask(view.mask, view.camera, of_view);
   }
   if (rig.world_from_imu) require_rigid(*rig.world_from_imu, name + ": IMU");
   for (std::size_t i = 0; i < rig.views.size(); ++i) {

@@ -322,7 +322,7 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   FaultyLoader::faults() = {.largest_image = 40};
   EXPECT_THAT(message_of_match(), HasSubstr("largest image width is 40"));
   FaultyLoader::faults() = {.largest_push_constants = 16};
-  EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 52"));
+  EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 64"));
 }
 
 TEST_F(VulkanFailures, MissingFunctionsAreNamed) {
