@@ -39,15 +39,10 @@ class Measure : public ::testing::Test {
     image.setTo(MASKED_INTENSITY, masked);
   }
 
-  struct Displacement {
-    double held = 0;
-    double measured = 0;
-  };
-
-  /// Over the middle of the image: pixels in the source between the wall and where the held plane,
-  /// `held` off, and its measure put the point.
-  std::vector<Displacement> measured(double held, unsigned how) {
-    std::vector<Displacement> all;
+  /// Pixels in the source between where the wall is and where the measure puts it, of a plane held
+  /// `held` pixels off, over the middle of the image.
+  std::vector<double> measured(double held, unsigned how) {
+    std::vector<double> all;
     for (int y = 24; y < size - 24; y += step) {
       for (int x = 24; x < size - 24; x += step) {
         const cv::Vec4f r = fixture_.view(0).rays(y, x);
@@ -63,15 +58,15 @@ class Measure : public ::testing::Test {
         if (speed <= 0) continue;
         fixture_.pass().candidates = how;
         const cv::Vec4f check = measure(wall_ + held / speed * ray);
-        all.push_back({held, (static_cast<double>(check[2]) - wall_.dot(ray)) * speed});
+        all.push_back((static_cast<double>(check[2]) - wall_.dot(ray)) * speed);
       }
     }
     return all;
   }
 
-  static double root_mean_square(const std::vector<Displacement>& all) {
+  static double root_mean_square(const std::vector<double>& all) {
     double sum = 0;
-    for (const Displacement& d : all) sum += d.measured * d.measured;
+    for (const double displacement : all) sum += displacement * displacement;
     return std::sqrt(sum / static_cast<double>(all.size()));
   }
 
@@ -101,9 +96,9 @@ TEST_F(Measure, SubpixelMatchNeedsEvidence) {
 }
 
 TEST_F(Measure, SubpixelMatchMovesNoFurtherThanAPatchCanTell) {
-  const auto matched = measured(3, SUBPIXEL_MATCH);
-  for (const Displacement& d : matched)
-    EXPECT_NEAR(d.measured, 3, static_cast<double>(LARGEST_SHIFT) + 0.1);
+  for (const double displacement : measured(3, SUBPIXEL_MATCH)) {
+    EXPECT_NEAR(displacement, 3, static_cast<double>(LARGEST_SHIFT) + 0.1);
+  }
 }
 
 }  // namespace
