@@ -101,7 +101,7 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--far-preference", far_preference,
       "How much better the nearest planes must match than the farthest, which keeps sky far");
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
-  add("--step-normal", step_normal, "First perturbation of a unit normal");
+  add("--step-normal", step_normal, "First perturbation of a unit normal, at the coarsest level");
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");
   add("--warm-iterations", warm_iterations, "Iterations of a frame started from the previous one");
   add("--warm-regressions", warm_regressions, "Plane regressions of such a frame");

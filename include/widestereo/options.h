@@ -96,7 +96,8 @@ struct Options {
   /// without texture and sky come out as far, 0..2.
   double far_preference = 0;
   double step_pixels = 1;     ///< first perturbation, source pixels; halved each iteration
-  double step_normal = 0.5;   ///< first perturbation of a unit normal; halved each iteration
+  double step_normal = 0.5;   ///< first perturbation of a unit normal, at the coarsest level only;
+                              ///< halved each iteration
   bool source_planes = true;  ///< try the planes that the source views hold
 
   /// Of a frame that starts from the previous one's planes (Matcher::match_next()).
