@@ -152,8 +152,9 @@ void convert(const CalibrationArguments& arguments) {
 void check(const CalibrationArguments& arguments) {
   const cv::Mat left = ws::read_image(arguments.left);
   const cv::Mat right = ws::read_image(arguments.right);
-  const ws::Rig rig =
-      rig_of_images(arguments.rig, arguments.poses, {arguments.left, arguments.right}, left.size());
+  const ws::Rig rig = calibrated_images(arguments.rig, arguments.poses,
+                                        {arguments.left, arguments.right}, left.size())
+                          .rig;
   const ws::View& first = rig.views[0];
   const ws::View& second = rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);
@@ -211,8 +212,7 @@ void add_calibration_command(CLI::App& app) {
       "check", "Measure the epipolar error of features matched between two images");
   check_command->add_option("left", arguments->left, "Image of the first camera")->required();
   check_command->add_option("right", arguments->right, "Image of the second camera")->required();
-  arguments->rig.add_to(*check_command);
-  arguments->poses.add_to(*check_command);
+  add_image_options(*check_command, arguments->rig, arguments->poses);
   check_command->add_flag("--json", arguments->as_json, "Print JSON");
   check_command->callback([arguments] { check(*arguments); });
 }

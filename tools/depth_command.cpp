@@ -9,6 +9,7 @@
 #include "pose_settings.h"
 #include "result_folder.h"
 #include "rig_settings.h"
+#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
 namespace ws = widestereo;
@@ -25,14 +26,32 @@ struct DepthArguments {
   bool as_json = false;
 };
 
+/// The range of a reconstruction's points where none is given: presets have one in metres.
+MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& images,
+                         const std::string& calibration) {
+  if (settings.min_distance && settings.max_distance) return settings;
+  if (images.distances) {
+    if (!settings.min_distance) settings.min_distance = images.distances->nearest;
+    if (!settings.max_distance) settings.max_distance = images.distances->farthest;
+  } else if (ws::is_colmap_model(calibration)) {
+    throw ws::Error(calibration +
+                    " has too few points in these images to tell how far the scene reaches; give "
+                    "--min-distance and --max-distance.");
+  }
+  return settings;
+}
+
 void run_depth(const DepthArguments& arguments) {
   std::vector<cv::Mat> images;
   for (const std::string& file : arguments.images) images.push_back(ws::read_image(file));
-  const ws::Rig rig =
-      rig_of_images(arguments.rig, arguments.poses, arguments.images, images.front().size());
+  const ws::CalibratedImages calibrated =
+      calibrated_images(arguments.rig, arguments.poses, arguments.images, images.front().size());
+  const ws::Rig& rig = calibrated.rig;
+  const MatchSettings settings =
+      with_range(arguments.settings, calibrated, arguments.rig.calibration);
   ws::prepare_output_folder(arguments.output);
 
-  const MatchingRun run = match_images(arguments.settings, rig, images);
+  const MatchingRun run = match_images(settings, rig, images);
   FolderContents contents{.rig = rig, .images = images, .run = run};
   contents.origin = {{"images", arguments.images}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
@@ -51,8 +70,7 @@ void add_depth_command(CLI::App& app) {
                    "LEFT RIGHT (or more views of one rig, or of a moving one)")
       ->required()
       ->expected(2, 8);
-  arguments->rig.add_to(*command);
-  arguments->poses.add_to(*command);
+  add_image_options(*command, arguments->rig, arguments->poses);
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record as JSON");

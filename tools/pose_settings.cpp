@@ -8,13 +8,6 @@
 
 namespace ws = widestereo;
 
-void PoseSettings::add_to(CLI::App& command) {
-  add_to(command,
-         "of images taken one after the other, all by camera 0 unless --views names others; by "
-         "time, or one for each in their order",
-         "Moving cameras");
-}
-
 void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const std::string& group) {
   command
       .add_option("--poses", file,
@@ -55,9 +48,26 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
   return read;
 }
 
-ws::Rig rig_of_images(const RigSettings& rig_settings, const PoseSettings& pose_settings,
-                      const std::vector<std::string>& files, cv::Size size) {
-  if (!pose_settings.given()) return rig_settings.rig_for_images(files.size(), size);
+void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses) {
+  rig.add_to(command, ", or folder of a COLMAP model, whose unit distances then have");
+  poses.add_to(
+      command,
+      "of images taken one after the other, all by camera 0 unless --views names others; by time, "
+      "or one for each in their order",
+      "Moving cameras");
+}
+
+ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
+                                       const PoseSettings& pose_settings,
+                                       const std::vector<std::string>& files, cv::Size size) {
+  if (ws::is_colmap_model(rig_settings.calibration)) {
+    if (pose_settings.given()) {
+      throw ws::Error("--poses has no meaning with a COLMAP model (" + rig_settings.calibration +
+                      "), which holds the poses; leave it out.");
+    }
+    return rig_settings.colmap_images(files);
+  }
+  if (!pose_settings.given()) return {rig_settings.rig_for_images(files.size(), size)};
   RigSettings settings = rig_settings;
   if (settings.views.empty()) settings.views.assign(files.size(), 0);
   ws::Rig rig = settings.rig_for_images(files.size(), size);
@@ -76,5 +86,5 @@ ws::Rig rig_of_images(const RigSettings& rig_settings, const PoseSettings& pose_
     view.world_from_camera = poses.front().inverse() * poses[i] * view.world_from_camera;
   }
   ws::validate(rig, pose_settings.file);
-  return rig;
+  return {rig};
 }

@@ -25,9 +25,7 @@ struct PoseSettings {
   std::string of;           ///< camera or imu; empty: as the file's layout says
   double tolerance = 0.01;  ///< seconds
 
-  /// Adds --poses, --poses-of and --poses-tolerance for rig_of_images().
-  void add_to(CLI::App& command);
-  /// The same for another `purpose`.
+  /// Adds --poses, --poses-of and --poses-tolerance.
   void add_to(CLI::App& command, const std::string& purpose, const std::string& group);
   bool given() const { return !file.empty(); }
   /// The poses at the `chosen` ones of all frames; `calibration` names the file of the rig.
@@ -36,8 +34,12 @@ struct PoseSettings {
                 const std::vector<std::size_t>& chosen) const;
 };
 
-/// The calibrated views of images as RigSettings::rig_for_images() gives them; with poses, of
-/// images that a rig, or one camera, took at different times: then all are of camera 0 unless `rig`
-/// names others, and the rig's frame is that of the first image.
-widestereo::Rig rig_of_images(const RigSettings& rig, const PoseSettings& poses,
-                              const std::vector<std::string>& files, cv::Size size);
+/// Adds the options that calibrated_images() takes.
+void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses);
+
+/// The calibrated views of images as RigSettings gives them; with poses, of images that a rig, or
+/// one camera, took at different times: then all are of camera 0 unless `rig` names others, and the
+/// rig's frame is that of the first image.
+widestereo::CalibratedImages calibrated_images(const RigSettings& rig, const PoseSettings& poses,
+                                               const std::vector<std::string>& files,
+                                               cv::Size size);

@@ -10,9 +10,10 @@
 
 namespace ws = widestereo;
 
-void RigSettings::add_to(CLI::App& command) {
+void RigSettings::add_to(CLI::App& command, const std::string& or_other) {
   command
-      .add_option("-c,--calibration", calibration, "Kalibr camchain, Basalt JSON or OpenCV file")
+      .add_option("-c,--calibration", calibration,
+                  "Kalibr camchain, Basalt JSON or OpenCV file" + or_other)
       ->required();
   command.add_option("--views", views, "Cameras of the calibration, one for each image")
       ->delimiter(',');
@@ -42,9 +43,25 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
     }
     rig.views.push_back(all.views[static_cast<std::size_t>(view)]);
   }
-  if (masks.size() > 1 && masks.size() != image_count) {
+  limit_fields_of_view(rig);
+  return rig;
+}
+
+ws::CalibratedImages RigSettings::colmap_images(const std::vector<std::string>& files) const {
+  if (!views.empty()) {
+    throw ws::Error("--views has no meaning with a COLMAP model (" + calibration +
+                    "), which names the camera of each image; leave it out.");
+  }
+  ws::CalibratedImages images = ws::read_colmap(calibration, {files.begin(), files.end()});
+  limit_fields_of_view(images.rig);
+  return images;
+}
+
+void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
+  if (masks.size() > 1 && masks.size() != rig.views.size()) {
     throw ws::Error("--mask was given " + std::to_string(masks.size()) + " times for " +
-                    std::to_string(image_count) + " images; give one for all or one for each.");
+                    std::to_string(rig.views.size()) +
+                    " images; give one for all or one for each.");
   }
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     ws::View& view = rig.views[i];
@@ -54,5 +71,4 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
       view.mask = ws::to_intensity(ws::read_image(file), file) > 0;
     }
   }
-  return rig;
 }

@@ -7,17 +7,24 @@
 #include <string>
 #include <vector>
 
+#include "widestereo/colmap.h"
 #include "widestereo/rig.h"
 
 struct RigSettings {
-  std::string calibration;
+  std::string calibration;         ///< file, or folder of a COLMAP model
   std::vector<int> views;          ///< cameras of the calibration; empty: the first ones
   std::vector<std::string> masks;  ///< none, one for all images or one for each
   double max_theta = 0;            ///< degrees, 0 = as calibrated
 
-  /// Adds --calibration, --views, --mask and --max-theta.
-  void add_to(CLI::App& command);
+  /// Adds --calibration, --views, --mask and --max-theta; `or_other`: what else --calibration may
+  /// be.
+  void add_to(CLI::App& command, const std::string& or_other = "");
   /// The calibrated views of `image_count` images, in their order, with masks; `size` of the first
   /// image.
   widestereo::Rig rig_for_images(std::size_t image_count, cv::Size size) const;
+  /// The same for files of a COLMAP model.
+  widestereo::CalibratedImages colmap_images(const std::vector<std::string>& files) const;
+
+ private:
+  void limit_fields_of_view(widestereo::Rig& rig) const;
 };

@@ -24,7 +24,7 @@ struct SynthesisArguments {
 void run_synthesis(const SynthesisArguments& a) {
   const cv::Mat image = ws::read_grey_levels(a.image);
   const cv::Mat other = ws::read_grey_levels(a.other);
-  const ws::Rig rig = rig_of_images(a.rig, a.poses, {a.image, a.other}, image.size());
+  const ws::Rig rig = calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size()).rig;
   const cv::Mat distance = ws::read_map(a.distance);
   ws::require_calibrated_size(image, rig.views[0], a.image);
   const ws::SynthesisedView synthesised =
@@ -49,8 +49,7 @@ void add_view_synthesis_command(CLI::App& app) {
   command->add_option("image", a->image, "The image that it is of")->required();
   command->add_option("other", a->other, "Another image, best one that took no part in matching")
       ->required();
-  a->rig.add_to(*command);
-  a->poses.add_to(*command);
+  add_image_options(*command, a->rig, a->poses);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_synthesis(*a); });

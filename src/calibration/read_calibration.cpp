@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "calibration/formats.h"
+#include "widestereo/colmap.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -46,6 +47,12 @@ Document load(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
     throw Error("There is no calibration file " + path.string() + "; check the path.");
+  }
+  if (is_colmap_model(path)) {
+    throw Error(
+        path.string() +
+        " is a COLMAP model, which calibrates images; only `depth`, `calibration check` and "
+        "`view-synthesis` take it.");
   }
   if (!std::filesystem::is_regular_file(path, error)) {
     throw Error(path.string() + " is not a file; give a calibration file.");

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// COLMAP's camera models and their equivalents.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "widestereo/camera.h"
+
+namespace widestereo::calibration {
+
+/// Parameters: one or two focal lengths, the principal point and the coefficients; none of the
+/// first two for panoramas.
+struct ColmapModel {
+  const char* name;
+  std::size_t focal_lengths;
+  std::optional<CameraModel> equivalent;
+  /// Where each coefficient goes; null: the equivalent needs it to be 0.
+  std::vector<double Camera::*> coefficients;
+
+  std::size_t parameters() const { return focal_lengths + 2 + coefficients.size(); }
+};
+
+/// All models, by COLMAP's number.
+const std::vector<ColmapModel>& colmap_models();
+
+struct ColmapCamera {
+  std::uint64_t number = 0;
+  const ColmapModel* model = nullptr;
+  double width = 0, height = 0;    ///< pixels
+  std::vector<double> parameters;  ///< as many as the model has
+};
+
+/// The equivalent camera. Throws Error, beginning with `name`, where there is none.
+Camera camera_of(const ColmapCamera& camera, const std::string& name);
+
+}  // namespace widestereo::calibration

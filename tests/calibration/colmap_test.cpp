@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/colmap.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+
+#include "error_of.h"
+#include "temporary_folder.h"
+#include "widestereo/calibration.h"
+
+namespace widestereo {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryFolder;
+
+const char* const cameras_text = R"(# Camera list with one line of data per camera:
+#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]
+1 OPENCV_FISHEYE 640 480 200 201 320.5 240.25 0.01 -0.002 0.0003 -0.00004
+7 SIMPLE_RADIAL 1000 800 900 500 400 -0.1
+)";
+
+// The second image observes nothing, the third is the last line of the file.
+const char* const images_text = R"(# Image list with two lines of data per image:
+3 0.9961946980917455 0.08715574274765817 0 0 0.5 -0.25 2 1 left/a b.png
+10 20 5 30 40 -1 50 60 6
+4 1 0 0 0 0 0 0 7 left/b.png
+
+9 1 0 0 0 -1 0 0 1 b.png)";
+
+/// A number's bytes in this order, as COLMAP writes them.
+template <class T>
+std::string bytes(T value) {
+  std::string text(sizeof value, '\0');
+  std::memcpy(text.data(), &value, sizeof value);
+  return text;
+}
+
+template <class... T>
+std::string doubles(T... values) {
+  return (bytes(static_cast<double>(values)) + ...);
+}
+
+std::string name(const std::string& text) { return text + '\0'; }
+
+const std::uint64_t none = ~std::uint64_t{0};
+
+/// The same as the texts.
+std::string cameras_binary() {
+  return bytes(std::uint64_t{2}) + bytes(std::uint32_t{1}) + bytes(5) + bytes(std::uint64_t{640}) +
+         bytes(std::uint64_t{480}) +
+         doubles(200, 201, 320.5, 240.25, 0.01, -0.002, 0.0003, -0.00004) +
+         bytes(std::uint32_t{7}) + bytes(2) + bytes(std::uint64_t{1000}) +
+         bytes(std::uint64_t{800}) + doubles(900, 500, 400, -0.1);
+}
+
+std::string images_binary() {
+  return bytes(std::uint64_t{3}) + bytes(std::uint32_t{3}) +
+         doubles(0.9961946980917455, 0.08715574274765817, 0, 0, 0.5, -0.25, 2) +
+         bytes(std::uint32_t{1}) + name("left/a b.png") + bytes(std::uint64_t{3}) +
+         doubles(10, 20) + bytes(std::uint64_t{5}) + doubles(30, 40) + bytes(none) +
+         doubles(50, 60) + bytes(std::uint64_t{6}) + bytes(std::uint32_t{4}) +
+         doubles(1, 0, 0, 0, 0, 0, 0) + bytes(std::uint32_t{7}) + name("left/b.png") +
+         bytes(std::uint64_t{0}) + bytes(std::uint32_t{9}) + doubles(1, 0, 0, 0, -1, 0, 0) +
+         bytes(std::uint32_t{1}) + name("b.png") + bytes(std::uint64_t{0});
+}
+
+class Colmap : public ::testing::Test {
+ protected:
+  void write_text(const std::string& cameras = cameras_text,
+                  const std::string& images = images_text) {
+    folder_.write("cameras.txt", cameras);
+    folder_.write("images.txt", images);
+  }
+  void write_binary(const std::string& cameras = cameras_binary(),
+                    const std::string& images = images_binary()) {
+    folder_.write("cameras.bin", cameras);
+    folder_.write("images.bin", images);
+  }
+  CalibratedImages read(const std::vector<fs::path>& files = {"/data/left/a b.png",
+                                                              "/data/left/b.png"}) {
+    return read_colmap(folder_.path(), files);
+  }
+  std::string error(const std::vector<fs::path>& files = {"/data/left/a b.png",
+                                                          "/data/left/b.png"}) {
+    return test::error_of([&] { read(files); });
+  }
+  /// The camera of a line of cameras.txt: model, size and parameters.
+  Camera camera(const std::string& line) {
+    write_text("1 " + line + "\n", images_text);
+    return read({"left/a b.png"}).rig.views.front().camera;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Colmap, ReadsCamerasAndPosesOfTheImagesAskedFor) {
+  write_text();
+  const Rig rig = read().rig;
+  ASSERT_EQ(rig.views.size(), 2u);
+  EXPECT_EQ(rig.views[0].name, "left/a b.png");
+  const Camera& fisheye = rig.views[0].camera;
+  EXPECT_EQ(fisheye.model, CameraModel::kannala_brandt);
+  EXPECT_EQ(fisheye.width, 640);
+  EXPECT_EQ(fisheye.height, 480);
+  EXPECT_DOUBLE_EQ(fisheye.k4, -0.00004);
+  const Camera& radial = rig.views[1].camera;
+  EXPECT_EQ(radial.model, CameraModel::pinhole_radtan);
+  EXPECT_DOUBLE_EQ(radial.fx, 900);
+  EXPECT_DOUBLE_EQ(radial.fy, 900);
+  EXPECT_DOUBLE_EQ(radial.k1, -0.1);
+  EXPECT_TRUE(rig.views[1].world_from_camera.isApprox(Eigen::Isometry3d::Identity()));
+}
+
+// COLMAP counts pixels from the image's corner, OpenCV from the first pixel's centre.
+TEST_F(Colmap, ProjectsWorldPointsLikeOpenCv) {
+  write_text();
+  const View view = read().rig.views.front();
+  const cv::Matx33d k(200, 0, 320, 0, 201, 239.75, 0, 0, 1);
+  // 10 degrees about x, and then the translation.
+  const cv::Vec3d rotation(10 * CV_PI / 180, 0, 0), translation(0.5, -0.25, 2);
+  const std::vector<cv::Point3d> points = {{0, 0, 1}, {1, -2, 0.5}, {-3, 1, 2}, {4, 4, 1}};
+  std::vector<cv::Point2d> expected;
+  cv::fisheye::projectPoints(points, expected, rotation, translation, k,
+                             cv::Vec4d(0.01, -0.002, 0.0003, -0.00004));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Eigen::Vector2d pixel;
+    const Eigen::Vector3d point(points[i].x, points[i].y, points[i].z);
+    ASSERT_TRUE(project(view.camera, view.world_from_camera.inverse() * point, pixel));
+    EXPECT_NEAR(pixel.x(), expected[i].x, 1e-6);
+    EXPECT_NEAR(pixel.y(), expected[i].y, 1e-6);
+  }
+}
+
+TEST_F(Colmap, ReadsBinaryFilesAsText) {
+  write_text();
+  const Rig text = read().rig;
+  write_binary();
+  const Rig binary = read().rig;
+  ASSERT_EQ(binary.views.size(), text.views.size());
+  for (std::size_t i = 0; i < text.views.size(); ++i) {
+    EXPECT_EQ(binary.views[i].name, text.views[i].name);
+    EXPECT_EQ(binary.views[i].camera.model, text.views[i].camera.model);
+    EXPECT_EQ(binary.views[i].camera.cx, text.views[i].camera.cx);
+    EXPECT_EQ(binary.views[i].camera.k1, text.views[i].camera.k1);
+    EXPECT_TRUE(binary.views[i].world_from_camera.isApprox(text.views[i].world_from_camera));
+  }
+}
+
+TEST_F(Colmap, TakesTheLongestNameThatEndsThePath) {
+  write_text();
+  EXPECT_EQ(read({"left/b.png"}).rig.views.front().name, "left/b.png");
+  EXPECT_EQ(read({"right/b.png"}).rig.views.front().name, "b.png");
+  EXPECT_EQ(read({"left/../right/b.png"}).rig.views.front().name, "b.png");
+}
+
+TEST_F(Colmap, ConvertsEveryModelWithAnEquivalent) {
+  EXPECT_EQ(camera("PINHOLE 8 8 2 3 4 4").fy, 3);
+  EXPECT_EQ(camera("SIMPLE_PINHOLE 8 8 2 4 4.5").cy, 4);
+  EXPECT_EQ(camera("RADIAL 8 8 2 4 4 0.1 0.2").k2, 0.2);
+  EXPECT_EQ(camera("OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4").p2, 0.4);
+  EXPECT_EQ(camera("FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0 0 0").k3, 0.5);
+  EXPECT_EQ(camera("FOV 8 8 2 3 4 4 0.9").omega, 0.9);
+  EXPECT_EQ(camera("SIMPLE_RADIAL_FISHEYE 8 8 2 4 4 0.1").k1, 0.1);
+  EXPECT_EQ(camera("RADIAL_FISHEYE 8 8 2 4 4 0.1 0.2").k2, 0.2);
+  EXPECT_EQ(camera("THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0 0 0.3 0.4 0 0").k4, 0.4);
+  EXPECT_EQ(camera("SIMPLE_FISHEYE 8 8 2 4 4").model, CameraModel::kannala_brandt);
+  EXPECT_EQ(camera("FISHEYE 8 8 2 3 4 4").fy, 3);
+  EXPECT_EQ(camera("EUCM 8 8 2 3 4 4 0.6 1.1").beta, 1.1);
+}
+
+TEST_F(Colmap, RefusesModelsWithoutEquivalentByName) {
+  for (const char* line : {"THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0.01 0 0.3 0.4 0 0",
+                           "FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0.6 0 0",
+                           "RAD_TAN_THIN_PRISM_FISHEYE 8 8 2 3 4 4 0 0 0 0 0 0 0 0 0 0 0 0",
+                           "DIVISION 8 8 2 3 4 4 0.1", "EQUIRECTANGULAR 8 4 8 4"}) {
+    const std::string model(line, std::string(line).find(' '));
+    const std::string message = test::error_of([&] { camera(line); });
+    EXPECT_NE(message.find("cameras.txt: The camera model " + model), std::string::npos) << message;
+  }
+}
+
+TEST_F(Colmap, RangeCoversTheDistancesOfObservedPoints) {
+  // Camera 4 is at the origin. It observes 101 points at distances 1 to 2, and camera 9 another
+  // one, which does not count.
+  std::string observations, points = "1000 500 0 0 0 0 0 0.5 9 0\n";
+  for (int i = 0; i <= 100; ++i) {
+    observations += "1 2 " + std::to_string(i) + " ";
+    const double z = 1 + i / 100.0;
+    points += std::to_string(i) + " 0 " + std::to_string(0.6 * z) + " " + std::to_string(0.8 * z) +
+              " 9 9 9 0.5 4 " + std::to_string(i) + "\n";
+  }
+  write_text(cameras_text,
+             "4 1 0 0 0 0 0 0 7 b.png\n" + observations + "\n9 1 0 0 0 -1 0 0 1 a.png\n7 8 1000\n");
+  EXPECT_FALSE(read({"b.png"}).distances);  // no file of points
+  folder_.write("points3D.txt", points);
+  const auto range = read({"b.png"}).distances;
+  ASSERT_TRUE(range);
+  EXPECT_NEAR(range->nearest, 0.75 * 1.01, 1e-6);
+  EXPECT_NEAR(range->farthest, 1.25 * 1.99, 1e-6);
+  EXPECT_FALSE(read({"a.png"}).distances);  // one point
+}
+
+TEST_F(Colmap, ReadsBinaryPoints) {
+  write_binary(
+      cameras_binary(), bytes(std::uint64_t{1}) + bytes(std::uint32_t{4}) +
+                            doubles(1, 0, 0, 0, 0, 0, 0) + bytes(std::uint32_t{7}) + name("b.png") +
+                            bytes(std::uint64_t{20}) + [] {
+                              std::string all;
+                              for (std::uint64_t i = 0; i < 20; ++i) {
+                                all += doubles(1, 2) + bytes(i);
+                              }
+                              return all;
+                            }());
+  std::string points = bytes(std::uint64_t{20});
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    // With a track of i images.
+    points += bytes(i) + doubles(0, 0, 4) + std::string(3, '\7') + doubles(0.5) + bytes(i) +
+              std::string(8 * i, '\1');
+  }
+  folder_.write("points3D.bin", points);
+  const auto range = read({"b.png"}).distances;
+  ASSERT_TRUE(range);
+  EXPECT_DOUBLE_EQ(range->nearest, 3);
+  EXPECT_DOUBLE_EQ(range->farthest, 5);
+  folder_.write("points3D.bin", points.substr(0, points.size() - 1));
+  EXPECT_NE(error({"b.png"}).find("points3D.bin ends too early"), std::string::npos);
+}
+
+TEST_F(Colmap, EveryTruncatedBinaryFileIsAnError) {
+  const std::string cameras = cameras_binary(), images = images_binary();
+  for (std::size_t size = 0; size < cameras.size(); ++size) {
+    write_binary(cameras.substr(0, size), images);
+    EXPECT_NE(error().find("cameras.bin ends too early"), std::string::npos) << size;
+  }
+  for (std::size_t size = 0; size < images.size(); ++size) {
+    write_binary(cameras, images.substr(0, size));
+    EXPECT_NE(error().find("images.bin ends too early"), std::string::npos) << size;
+  }
+}
+
+TEST_F(Colmap, BadTextNamesFileAndLine) {
+  write_text("1 OPENCV_FISHEYE 640 480 200 201 320.5\n");
+  EXPECT_NE(error().find("cameras.txt line 1 lacks parameters"), std::string::npos) << error();
+  write_text("# comment\n1 OCAM 640 480 200\n");
+  EXPECT_NE(error().find("cameras.txt line 2 has the unknown camera model \"OCAM\""),
+            std::string::npos)
+      << error();
+  write_text(cameras_text, "3 1 0 0 0 0 0 1\n\n");
+  EXPECT_NE(error().find("images.txt line 1 lacks"), std::string::npos) << error();
+  write_text(cameras_text, "3 1 1 0 0 0 0 1 1 left/a b.png\n\n");
+  EXPECT_NE(error().find("quaternion of length 1.41"), std::string::npos) << error();
+  write_text(cameras_text, "3 1 0 0 0 0 0 1 1 left/a b.png\n1 2 nan\n");
+  EXPECT_NE(error().find("images.txt line 2 lacks"), std::string::npos) << error();
+}
+
+TEST_F(Colmap, MissingPartsAreErrors) {
+  EXPECT_NE(error().find("is no COLMAP model"), std::string::npos);
+  EXPECT_FALSE(is_colmap_model(folder_.path()));
+  EXPECT_FALSE(is_colmap_model(folder_.path() / "none"));
+  write_text();
+  EXPECT_TRUE(is_colmap_model(folder_.path()));
+  EXPECT_NE(error({"left/c.png"})
+                .find("has no image whose name is the end of left/c.png among "
+                      "its 3 (the first is left/a b.png)"),
+            std::string::npos)
+      << error({"left/c.png"});
+  EXPECT_NE(error({"b.png", "b.png"}).find("have the same centre"), std::string::npos);
+  write_text("7 SIMPLE_RADIAL 1000 800 900 500 400 -0.1\n");
+  EXPECT_NE(error().find("cameras.txt has no camera 1, which took left/a b.png"), std::string::npos)
+      << error();
+  EXPECT_NE(test::error_of([&] { read_calibration(folder_.path()); }).find("is a COLMAP model"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace widestereo

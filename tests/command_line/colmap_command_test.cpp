@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+// Images whose calibration is a COLMAP model.
+#include <nlohmann/json.hpp>
+
+#include "command_fixture.h"
+
+namespace widestereo {
+namespace {
+
+using test::Outcome;
+using test::run;
+
+/// The pair as COLMAP would have registered it, and the same calibration for Kalibr.
+class ColmapCommand : public test::Command {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    const std::string camera = R"(  camera_model: pinhole
+  intrinsics: [30, 31, 47.5, 48]
+  distortion_model: equidistant
+  distortion_coeffs: [0.01, -0.002, 0, 0]
+  resolution: [96, 96]
+)";
+    folder_.write("same.yaml", "cam0:\n" + camera + "cam1:\n" + camera +
+                                   "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], "
+                                   "[0, 0, 0, 1]]\n");
+    std::filesystem::create_directories(folder_ / "model");
+    folder_.write("model/cameras.txt", "1 OPENCV_FISHEYE 96 96 30 31 48 48.5 0.01 -0.002 0 0\n");
+    std::string observations, points;
+    for (int i = 0; i < 40; ++i) {
+      observations += "1 1 " + std::to_string(i) + " ";
+      points += std::to_string(i) + " 0 0 " + (i == 0 ? "1" : "4") + " 0 0 0 1 1 0\n";
+    }
+    folder_.write("model/images.txt", "1 1 0 0 0 0 0 0 1 left.png\n" + observations +
+                                          "\n2 1 0 0 0 -0.1 0 0 1 right.png\n\n");
+    folder_.write("model/points3D.txt", points);
+  }
+
+  /// `depth` in the images' own order with the preset's, or the model's, range.
+  std::string depth(const std::string& calibration, const std::string& output) const {
+    return "depth " + file("left.png") + " " + file("right.png") + " -c " + file(calibration) +
+           " -o " + file(output) +
+           " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2 ";
+  }
+  cv::Mat distance_in(const std::string& output) const {
+    return cv::imread(file(output + "/distance0.tiff"), cv::IMREAD_UNCHANGED);
+  }
+};
+
+TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
+  const Outcome colmap = run(depth("model", "colmap"));
+  ASSERT_EQ(colmap.exit_code, 0) << colmap.output;
+  EXPECT_NE(colmap.output.find("right.png: "), std::string::npos) << colmap.output;
+  // Points at 1 and 4 with a quarter to spare.
+  const Outcome kalibr = run(depth("same.yaml", "out") + "--min-distance 0.75 --max-distance 5");
+  ASSERT_EQ(kalibr.exit_code, 0) << kalibr.output;
+  ASSERT_GT(cv::countNonZero(distance_in("out")), 5000);
+  EXPECT_EQ(cv::norm(distance_in("colmap"), distance_in("out"), cv::NORM_INF), 0);
+}
+
+TEST_F(ColmapCommand, RangesGivenCountMore) {
+  const Outcome outcome = run(depth("model", "colmap") + "--max-distance 9");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  std::ifstream stream(folder_ / "colmap/result.json");
+  const nlohmann::json options = nlohmann::json::parse(stream)["options"];
+  EXPECT_EQ(options["min_distance"], 0.75);
+  EXPECT_EQ(options["max_distance"], 9);
+}
+
+TEST_F(ColmapCommand, WhatItCannotTellIsAskedFor) {
+  std::filesystem::remove(folder_ / "model/points3D.txt");
+  expect_error(depth("model", "out") + "--max-distance 9",
+               "give --min-distance and --max-distance");
+  EXPECT_EQ(run(depth("model", "out") + "--min-distance 1 --max-distance 9").exit_code, 0);
+}
+
+TEST_F(ColmapCommand, OptionsWithoutMeaningAreRefused) {
+  folder_.write("poses.txt", "0 0 0 0 0 0 0 1\n1 0.1 0 0 0 0 0 1\n");
+  expect_error(depth("model", "out") + "--views 0,1", "--views has no meaning");
+  expect_error(depth("model", "out") + "--poses " + file("poses.txt"), "--poses has no meaning");
+  for (const char* camera : {"frames/cam0", "frames/cam1"}) {
+    std::filesystem::create_directories(folder_ / camera);
+    std::filesystem::copy_file(file("left.png"), folder_ / camera / "1.png");
+  }
+  expect_error("sequence " + file("frames") + " -c " + file("model") + " -o " + file("out"),
+               "is a COLMAP model");
+  expect_error("calibration show " + file("model"), "is a COLMAP model");
+}
+
+TEST_F(ColmapCommand, MasksAndFieldsOfViewApply) {
+  cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 48) = 0;
+  cv::imwrite(file("mask.png"), mask);
+  const Outcome outcome =
+      run(depth("model", "colmap") + "--max-theta 50 --json --mask " + file("mask.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(nlohmann::json::parse(outcome.output)["views"][1]["max_theta_degrees"], 50);
+  EXPECT_EQ(cv::countNonZero(distance_in("colmap").colRange(0, 48)), 0);
+  EXPECT_GT(cv::countNonZero(distance_in("colmap").colRange(48, 96)), 500);
+}
+
+}  // namespace
+}  // namespace widestereo
