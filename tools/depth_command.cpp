@@ -18,6 +18,7 @@ namespace {
 
 struct DepthArguments {
   std::vector<std::string> images;
+  int sources = 2;
   std::string output;
   RigSettings rig;
   PoseSettings poses;
@@ -41,11 +42,31 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
   return settings;
 }
 
+/// One image is joined by the best ones of its COLMAP model.
+std::vector<std::string> files_of(const DepthArguments& arguments) {
+  std::vector<std::string> files = arguments.images;
+  if (files.size() > 1) return files;
+  if (!ws::is_colmap_model(arguments.rig.calibration)) {
+    throw ws::Error(
+        "One image is not enough, unless --calibration is a COLMAP model to choose "
+        "others from; give two or more.");
+  }
+  const auto sources = ws::colmap_sources(arguments.rig.calibration, files.front(),
+                                          static_cast<std::size_t>(arguments.sources));
+  if (sources.empty()) {
+    throw ws::Error(arguments.rig.calibration + " has no image that shares points with " +
+                    files.front() + "; give two or more images.");
+  }
+  for (const auto& source : sources) files.push_back(source.string());
+  return files;
+}
+
 void run_depth(const DepthArguments& arguments) {
+  const std::vector<std::string> files = files_of(arguments);
   std::vector<cv::Mat> images;
-  for (const std::string& file : arguments.images) images.push_back(ws::read_image(file));
+  for (const std::string& file : files) images.push_back(ws::read_image(file));
   const ws::CalibratedImages calibrated =
-      calibrated_images(arguments.rig, arguments.poses, arguments.images, images.front().size());
+      calibrated_images(arguments.rig, arguments.poses, files, images.front().size());
   const ws::Rig& rig = calibrated.rig;
   const MatchSettings settings =
       with_range(arguments.settings, calibrated, arguments.rig.calibration);
@@ -53,7 +74,7 @@ void run_depth(const DepthArguments& arguments) {
 
   const MatchingRun run = match_images(settings, rig, images);
   FolderContents contents{.rig = rig, .images = images, .run = run};
-  contents.origin = {{"images", arguments.images}, {"calibration", arguments.rig.calibration}};
+  contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
@@ -67,10 +88,16 @@ void add_depth_command(CLI::App& app) {
   auto arguments = std::make_shared<DepthArguments>();
   command
       ->add_option("images", arguments->images,
-                   "LEFT RIGHT (or more views of one rig, or of a moving one)")
+                   "LEFT RIGHT (or more views of one rig, or of a moving one); or one image of a "
+                   "COLMAP model, which others join")
       ->required()
-      ->expected(2, 8);
+      ->expected(1, 8);
   add_image_options(*command, arguments->rig, arguments->poses);
+  command
+      ->add_option("--sources", arguments->sources,
+                   "How many others of the model join one image, best first")
+      ->check(CLI::Range(1, 7))
+      ->capture_default_str();
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record as JSON");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -23,6 +24,9 @@ constexpr std::size_t fewest_points = 20;
 // As COLMAP's own dense stereo does.
 constexpr double quantile = 0.01;
 constexpr double margin = 0.25;
+constexpr double best_angle = 5;  // degrees
+
+using Points = std::unordered_map<std::uint64_t, Eigen::Vector3d>;
 
 /// How many components `name` has where it is the end of `path`, else 0.
 std::size_t shared_end(const fs::path& path, const fs::path& name) {
@@ -31,6 +35,37 @@ std::size_t shared_end(const fs::path& path, const fs::path& name) {
   const bool is_end =
       end.size() <= whole.size() && std::equal(end.rbegin(), end.rend(), whole.rbegin());
   return is_end ? end.size() : 0;
+}
+
+/// What is left of an image's file without its name in the model.
+fs::path folder_of_images(const fs::path& file, const fs::path& name) {
+  fs::path folder = fs::absolute(file).lexically_normal();
+  for (std::size_t i = shared_end(folder, name.lexically_normal()); i > 0; --i) {
+    folder = folder.parent_path();
+  }
+  return folder;
+}
+
+void require_model(const fs::path& folder) {
+  if (is_colmap_model(folder)) return;
+  throw Error(folder.string() +
+              " is no COLMAP model; give a folder with cameras and images, .bin or .txt.");
+}
+
+Eigen::Vector3d centre_of(const ColmapImage& image) {
+  return image.camera_from_world.inverse().translation();
+}
+
+double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// How much a point tells that is seen under this angle (radians) from two images.
+double worth_of_angle(double angle) {
+  const double degrees = angle * 180 / std::numbers::pi;
+  const double deviation = degrees < best_angle ? 1 : 10;
+  const double x = (degrees - best_angle) / deviation;
+  return std::exp(-0.5 * x * x);
 }
 
 /// The model's image for each file.
@@ -70,16 +105,21 @@ std::map<std::uint64_t, ColmapCamera> cameras_of(const fs::path& file) {
   return cameras;
 }
 
-std::optional<DistanceRange> distances_of(const fs::path& folder,
-                                          const std::vector<ColmapImage>& images) {
+/// The points that images observe; none where the model has no file of points.
+Points points_of(const fs::path& folder, const std::vector<ColmapImage>& images) {
+  Points points;
   const fs::path file = colmap_file(folder, "points3D");
-  if (file.empty()) return std::nullopt;
+  if (file.empty()) return points;
   std::unordered_set<std::uint64_t> observed;
   for (const ColmapImage& image : images) observed.insert(image.points.begin(), image.points.end());
-  std::unordered_map<std::uint64_t, Eigen::Vector3d> points;
   calibration::each_colmap_point(file, [&](std::uint64_t number, const Eigen::Vector3d& position) {
     if (observed.contains(number)) points.emplace(number, position);
   });
+  return points;
+}
+
+std::optional<DistanceRange> distances_of(const std::vector<ColmapImage>& images,
+                                          const Points& points) {
   std::vector<double> distances;
   for (const ColmapImage& image : images) {
     for (const std::uint64_t number : image.points) {
@@ -104,10 +144,7 @@ bool is_colmap_model(const fs::path& path) {
 }
 
 CalibratedImages read_colmap(const fs::path& folder, const std::vector<fs::path>& files) {
-  if (!is_colmap_model(folder)) {
-    throw Error(folder.string() +
-                " is no COLMAP model; give a folder with cameras and images, .bin or .txt.");
-  }
+  require_model(folder);
   const fs::path cameras_file = colmap_file(folder, "cameras");
   const auto cameras = cameras_of(cameras_file);
   const std::vector<ColmapImage> images = images_of_files(folder, files);
@@ -124,8 +161,36 @@ CalibratedImages read_colmap(const fs::path& folder, const std::vector<fs::path>
     view.world_from_camera = image.camera_from_world.inverse();
   }
   validate(calibrated.rig, folder.string());
-  calibrated.distances = distances_of(folder, images);
+  calibrated.distances = distances_of(images, points_of(folder, images));
   return calibrated;
+}
+
+std::vector<fs::path> colmap_sources(const fs::path& folder, const fs::path& file,
+                                     std::size_t count) {
+  require_model(folder);
+  const std::vector<ColmapImage> reference = images_of_files(folder, {file});
+  const ColmapImage& image = reference.front();
+  const Points points = points_of(folder, reference);
+  const Eigen::Vector3d centre = centre_of(image);
+  std::vector<std::pair<double, std::string>> ranked;
+  calibration::each_colmap_image(colmap_file(folder, "images"), [&](const ColmapImage& other) {
+    if (other.name == image.name) return;
+    double score = 0;
+    for (const std::uint64_t number : other.points) {
+      const auto point = points.find(number);
+      if (point == points.end()) continue;
+      score +=
+          worth_of_angle(angle_between(point->second - centre, point->second - centre_of(other)));
+    }
+    if (score > 0) ranked.emplace_back(-score, other.name);
+  });
+  std::sort(ranked.begin(), ranked.end());
+  const fs::path images = folder_of_images(file, image.name);
+  std::vector<fs::path> sources;
+  for (std::size_t i = 0; i < std::min(count, ranked.size()); ++i) {
+    sources.push_back(images / ranked[i].second);
+  }
+  return sources;
 }
 
 }  // namespace widestereo

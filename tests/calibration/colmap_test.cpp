@@ -204,6 +204,32 @@ TEST_F(Colmap, RangeCoversTheDistancesOfObservedPoints) {
   EXPECT_FALSE(read({"a.png"}).distances);  // one point
 }
 
+/// Points 10 in front of the camera of left/a.png. Of the others, "near" is 0.03 beside it, "far"
+/// 0.9 and "few" too; "none" sees other points.
+TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {
+  std::string points, all, few;
+  for (int i = 0; i < 60; ++i) {
+    points += std::to_string(i) + " 0 0 10 9 9 9 0.5 1 1\n";
+    (i < 10 ? few : all) += "1 2 " + std::to_string(i) + " ";
+  }
+  all += few;
+  const std::string pose = " 1 0 0 0 ";
+  write_text(cameras_text, "1" + pose + "0 0 0 1 left/a.png\n" + all +  //
+                               "\n2" + pose + "-0.9 0 0 1 left/few.png\n" + few + "\n3" + pose +
+                               "-0.03 0 0 1 left/near.png\n" + all + "\n4" + pose +
+                               "0.9 0 0 1 right/far.png\n" + all + "\n5" + pose +
+                               "0.9 0 0 1 right/none.png\n1 2 99\n");
+  folder_.write("points3D.txt", points + "99 0 0 5 9 9 9 0.5 1 1\n");
+  using Files = std::vector<fs::path>;
+  EXPECT_EQ(colmap_sources(folder_.path(), "/data/left/a.png", 2),
+            (Files{"/data/right/far.png", "/data/left/few.png"}));
+  EXPECT_EQ(colmap_sources(folder_.path(), "/data/left/a.png", 9),
+            (Files{"/data/right/far.png", "/data/left/few.png", "/data/left/near.png"}));
+  EXPECT_EQ(colmap_sources(folder_.path(), "/data/right/none.png", 9), Files{});
+  EXPECT_NE(test::error_of([&] { colmap_sources(folder_.path(), "b.png", 1); }).find("b.png"),
+            std::string::npos);
+}
+
 TEST_F(Colmap, ReadsBinaryPoints) {
   write_binary(
       cameras_binary(), bytes(std::uint64_t{1}) + bytes(std::uint32_t{4}) +

@@ -32,7 +32,8 @@ class ColmapCommand : public test::Command {
       points += std::to_string(i) + " 0 0 " + (i == 0 ? "1" : "4") + " 0 0 0 1 1 0\n";
     }
     folder_.write("model/images.txt", "1 1 0 0 0 0 0 0 1 left.png\n" + observations +
-                                          "\n2 1 0 0 0 -0.1 0 0 1 right.png\n\n");
+                                          "\n2 1 0 0 0 -0.1 0 0 1 right.png\n" + observations +
+                                          "\n3 1 0 0 0 5 0 0 1 away.png\n\n");
     folder_.write("model/points3D.txt", points);
   }
 
@@ -41,6 +42,10 @@ class ColmapCommand : public test::Command {
     return "depth " + file("left.png") + " " + file("right.png") + " -c " + file(calibration) +
            " -o " + file(output) +
            " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2 ";
+  }
+  nlohmann::json options_of(const std::string& output) const {
+    std::ifstream stream(folder_ / (output + "/result.json"));
+    return nlohmann::json::parse(stream)["options"];
   }
   cv::Mat distance_in(const std::string& output) const {
     return cv::imread(file(output + "/distance0.tiff"), cv::IMREAD_UNCHANGED);
@@ -51,20 +56,36 @@ TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
   const Outcome colmap = run(depth("model", "colmap"));
   ASSERT_EQ(colmap.exit_code, 0) << colmap.output;
   EXPECT_NE(colmap.output.find("right.png: "), std::string::npos) << colmap.output;
-  // Points at 1 and 4 with a quarter to spare.
-  const Outcome kalibr = run(depth("same.yaml", "out") + "--min-distance 0.75 --max-distance 5");
+  // From right.png, points at 1 and 4 are a little farther than from left.png.
+  const nlohmann::json options = options_of("colmap");
+  EXPECT_EQ(options["min_distance"], 0.75);
+  EXPECT_NEAR(options["max_distance"], 1.25 * std::hypot(4, 0.1), 1e-9);
+  const Outcome kalibr =
+      run(depth("same.yaml", "out") + "--min-distance " + options["min_distance"].dump() +
+          " --max-distance " + options["max_distance"].dump());
   ASSERT_EQ(kalibr.exit_code, 0) << kalibr.output;
   ASSERT_GT(cv::countNonZero(distance_in("out")), 5000);
   EXPECT_EQ(cv::norm(distance_in("colmap"), distance_in("out"), cv::NORM_INF), 0);
 }
 
+TEST_F(ColmapCommand, OneImageIsJoinedByTheBestOthers) {
+  std::string one = depth("model", "one");
+  one.erase(one.find(file("right.png")), file("right.png").size());
+  const Outcome joined = run(one);
+  ASSERT_EQ(joined.exit_code, 0) << joined.output;
+  ASSERT_EQ(run(depth("model", "colmap")).exit_code, 0);
+  EXPECT_EQ(cv::norm(distance_in("one"), distance_in("colmap"), cv::NORM_INF), 0);
+  expect_error("depth " + file("left.png") + " -c " + file("same.yaml") + " -o " + file("out"),
+               "One image is not enough");
+  expect_error("depth " + file("away.png") + " -c " + file("model") + " -o " + file("out"),
+               "no image that shares points");
+}
+
 TEST_F(ColmapCommand, RangesGivenCountMore) {
   const Outcome outcome = run(depth("model", "colmap") + "--max-distance 9");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  std::ifstream stream(folder_ / "colmap/result.json");
-  const nlohmann::json options = nlohmann::json::parse(stream)["options"];
-  EXPECT_EQ(options["min_distance"], 0.75);
-  EXPECT_EQ(options["max_distance"], 9);
+  EXPECT_EQ(options_of("colmap")["min_distance"], 0.75);
+  EXPECT_EQ(options_of("colmap")["max_distance"], 9);
 }
 
 TEST_F(ColmapCommand, WhatItCannotTellIsAskedFor) {
