@@ -142,6 +142,28 @@ FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int m
   return has_x && has_y;
 }
 
+// What a patch of the reference starts from in a source.
+struct PatchStart {
+  float centre_a;  // intensity of the reference at the centre
+  float centre_b;  // and of the source: sums are taken relative to them, single precision then suffices
+  PatchMap map;    // into what sample_image() reads
+};
+
+// False where the source does not see the plane's front at the patch's centre, or too little around it.
+FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, int source,
+                    ivec2 pixel, vec3 m, bool mapped, OUT(PatchStart) start) {
+  if (side_of_source(pair, m) <= 0.0f) return false;
+  vec2 centre;
+  if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return false;
+  start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
+  start.centre_a = intensity_at(CONTEXT PASS.reference, pixel);
+  if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
+  if (!mapped) return true;
+  if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, start.map)) return false;
+  start.map.u0 = texel_at(start.map.u0, FILTER);
+  return true;
+}
+
 // The part of the map for one row of the patch, from its first column x on: start + dx (slope + dx bend).
 struct RowMap {
   vec2 start;
@@ -210,20 +232,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   ViewPair pair = PARAMETERS.pairs[reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
-  if (side_of_source(pair, m) <= 0.0f) return INVALID_COST;
-
-  // Sums are taken relative to the centre's intensities: single precision then suffices.
-  vec2 centre;
-  if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return INVALID_COST;
-  float centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
-  float centre_a = intensity_at(CONTEXT reference, pixel);
-  if (!(min(centre_a, centre_b) >= 0.0f)) return INVALID_COST;
-
-  PatchMap map;
-  if (WARP != WARP_EXACT) {
-    if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, map)) return INVALID_COST;
-    map.u0 = texel_at(map.u0, FILTER);
-  }
+  PatchStart start;
+  if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, WARP != WARP_EXACT, start)) return INVALID_COST;
 
   float inverse_scale = PARAMETERS.support.x;
   float of_patch = 0.0f;
@@ -236,10 +246,10 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   UNROLL_ROWS for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
     int first = first_column(CONTEXT dy);
     RowMap row;
-    if (WARP != WARP_EXACT) row = map_row(CONTEXT map, float(first), float(dy));
+    if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
     UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
-      float a = intensity_at(CONTEXT reference, q) - centre_a;
+      float a = intensity_at(CONTEXT reference, q) - start.centre_a;
       // Samples that are not seen weigh nothing: no branches, as most are seen.
       float weight = sample_weight(CONTEXT a, inverse_scale);
       of_patch += weight;
@@ -254,7 +264,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       }
       float b = sample_image(CONTEXT source, camera.size, texel);
       weight = b >= 0.0f ? weight : 0.0f;
-      b -= centre_b;
+      b -= start.centre_b;
       float weighted_a = weight * a;
       float weighted_b = weight * b;
       n += weight;

@@ -71,13 +71,8 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
   ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
-  vec2 centre;
-  if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return 0.0f;
-  float centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
-  float centre_a = intensity_at(CONTEXT PASS.reference, pixel);
-  PatchMap map;
-  if (centre_b < 0.0f || !map_patch(CONTEXT pair, camera, model, m, pixel, centre, map)) return 0.0f;
-  map.u0 = texel_at(map.u0, FILTER);
+  PatchStart start;
+  if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, start)) return 0.0f;
   float n = 0.0f;
   float sum_a = 0.0f;
   float sum_b = 0.0f;
@@ -89,15 +84,15 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
   float sum_ss = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
     int first = first_column(CONTEXT dy);
-    RowMap row = map_row(CONTEXT map, float(first), float(dy));
+    RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
     for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
       float a = intensity_at(CONTEXT PASS.reference, q);
       float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
       float slope;
       if (!slope_at(CONTEXT q, direction, slope) || min(a, b) < 0.0f) continue;
-      a -= centre_a;
-      b -= centre_b;
+      a -= start.centre_a;
+      b -= start.centre_b;
       float weight = sample_weight(CONTEXT a, PARAMETERS.support.x);
       n += weight;
       sum_a += weight * a;
