@@ -152,11 +152,10 @@ void convert(const CalibrationArguments& arguments) {
 void check(const CalibrationArguments& arguments) {
   const cv::Mat left = ws::read_image(arguments.left);
   const cv::Mat right = ws::read_image(arguments.right);
-  const ws::Rig rig = calibrated_images(arguments.rig, arguments.poses,
-                                        {arguments.left, arguments.right}, left.size())
-                          .rig;
-  const ws::View& first = rig.views[0];
-  const ws::View& second = rig.views[1];
+  const ws::CalibratedImages images = calibrated_images(
+      arguments.rig, arguments.poses, {arguments.left, arguments.right}, left.size());
+  const ws::View& first = images.rig.views[0];
+  const ws::View& second = images.rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);
   ws::require_calibrated_size(right, second, arguments.right);
   const ws::EpipolarReport r = check_epipolar(first, second, ws::match_features(left, right));
@@ -177,13 +176,14 @@ void check(const CalibrationArguments& arguments) {
               << "\n";
     return;
   }
+  const char* unit = images.in_metres ? " m" : "";
   std::printf(
       "%d matched features\n"
       "epipolar error: median %.2f px, %.3f degrees; %.0f %% below 1 px, %.0f %% below 5 px\n"
-      "distances: 5 %% below %.2f m, half below %.2f m, 95 %% below %.2f m\n"
+      "distances: 5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s\n"
       "calibration: %s\n",
       r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
-      r.nearest, r.typical, r.farthest, verdict);
+      r.nearest, unit, r.typical, unit, r.farthest, unit, verdict);
 }
 
 }  // namespace

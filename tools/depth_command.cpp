@@ -34,7 +34,7 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
   if (images.distances) {
     if (!settings.min_distance) settings.min_distance = images.distances->nearest;
     if (!settings.max_distance) settings.max_distance = images.distances->farthest;
-  } else if (ws::is_colmap_model(calibration)) {
+  } else if (!images.in_metres) {
     throw ws::Error(calibration +
                     " has too few points in these images to tell how far the scene reaches; give "
                     "--min-distance and --max-distance.");
@@ -73,7 +73,8 @@ void run_depth(const DepthArguments& arguments) {
   ws::prepare_output_folder(arguments.output);
 
   const MatchingRun run = match_images(settings, rig, images);
-  FolderContents contents{.rig = rig, .images = images, .run = run};
+  FolderContents contents{
+      .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres};
   contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,

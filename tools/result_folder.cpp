@@ -100,8 +100,9 @@ class ViewWriter {
     const bool has_truth = !contents_.truths.empty();
     const ws::ColourRange range =
         ws::robust_range(has_truth ? contents_.truths[index_].distance : accepted_);
-    const auto distances = [&range](const cv::Mat& map) {
-      return ws::with_distance_legend(ws::distance_picture(map, range), range);
+    const std::string unit = contents_.in_metres ? " m" : "";
+    const auto distances = [&](const cv::Mat& map) {
+      return ws::with_distance_legend(ws::distance_picture(map, range), range, unit);
     };
     const cv::Mat accepted = distances(accepted_);
     const cv::Mat normals = ws::normal_picture(result_.normals);
@@ -154,8 +155,9 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
   }
   record["patch_samples"] = run.result.samples;
   record["conventions"] = {
-      {"distance", "metres along the unit viewing ray through the pixel centre; 0 = no value"},
-      {"distance_png", "16 bit, " + Json(format.png_scale).dump() + " units per metre"},
+      {"unit", contents.in_metres ? "metre" : "that of the reconstruction"},
+      {"distance", "units along the unit viewing ray through the pixel centre; 0 = no value"},
+      {"distance_png", "16 bit, " + Json(format.png_scale).dump() + " to a unit"},
       {"distance_accepted", "distance, 0 where reasons is not 0 and the pixel was not filled"},
       {"normals",
        "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
@@ -169,7 +171,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
        "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
        "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle; 1024 = filled all the "
        "same; 0 = accepted; 16 bit"},
-      {"cloud", "world frame, metres, accepted pixels"},
+      {"cloud", "world frame, accepted pixels"},
       {"pixels", "integer coordinates are pixel centres"}};
   return record;
 }

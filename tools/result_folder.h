@@ -34,6 +34,7 @@ struct FolderContents {
   const widestereo::Rig& rig;
   const std::vector<cv::Mat>& images;
   const MatchingRun& run;
+  bool in_metres = true;                              ///< else in a reconstruction's unit
   nlohmann::ordered_json origin = {};                 ///< where the images came from
   std::vector<widestereo::GroundTruth> truths = {};   ///< one for each view, or none
   std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none

@@ -19,6 +19,7 @@ struct DistanceRange {
 struct CalibratedImages {
   Rig rig;
   std::optional<DistanceRange> distances = std::nullopt;
+  bool in_metres = true;  ///< else the unit of length is a reconstruction's own
 };
 
 /// Whether a path is a folder that COLMAP writes a reconstruction to (cameras and images, .bin or

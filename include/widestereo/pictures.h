@@ -34,8 +34,9 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
 cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
                       cv::Size size);
 
-/// A picture with a legend below: the colour bar of distance_picture() with distances in metres.
-cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range);
+/// A picture with a legend below: the colour bar of distance_picture() with distances in `unit`.
+cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range,
+                             const std::string& unit = " m");
 /// ... the colour bar of scalar_picture() with its end values.
 cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high);
 /// ... the colours of reason_picture().

@@ -149,6 +149,7 @@ CalibratedImages read_colmap(const fs::path& folder, const std::vector<fs::path>
   const auto cameras = cameras_of(cameras_file);
   const std::vector<ColmapImage> images = images_of_files(folder, files);
   CalibratedImages calibrated;
+  calibrated.in_metres = false;
   for (const ColmapImage& image : images) {
     const auto camera = cameras.find(image.camera);
     if (camera == cameras.end()) {

@@ -189,12 +189,13 @@ cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_fr
   return picture;
 }
 
-cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range) {
+cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range,
+                             const std::string& unit) {
   std::vector<std::pair<double, std::string>> labels;
   const double low = 1 / range.farthest;
   const double high = 1 / range.nearest;
   for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-    labels.emplace_back(share, metres(1 / (low + share * (high - low))) + " m");
+    labels.emplace_back(share, metres(1 / (low + share * (high - low))) + unit);
   }
   return with_bar(picture, cv::COLORMAP_TURBO, labels);
 }

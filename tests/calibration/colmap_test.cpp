@@ -268,6 +268,27 @@ TEST_F(Colmap, EveryTruncatedBinaryFileIsAnError) {
   }
 }
 
+/// Whatever is in the files, nothing but Error comes out, if anything.
+TEST_F(Colmap, DamagedBinaryFilesAreReadOrRefused) {
+  const std::string cameras = cameras_binary(), images = images_binary();
+  int refused = 0;
+  const auto damage = [](std::string text, std::size_t i, char value) {
+    text[i] = value;
+    return text;
+  };
+  for (const char value : {'\0', '\x7f', '\xff'}) {
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      write_binary(damage(cameras, i, value), images);
+      refused += !error().empty();
+    }
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      write_binary(cameras, damage(images, i, value));
+      refused += !error().empty();
+    }
+  }
+  EXPECT_GT(refused, 300);
+}
+
 TEST_F(Colmap, BadTextNamesFileAndLine) {
   write_text("1 OPENCV_FISHEYE 640 480 200 201 320.5\n");
   EXPECT_NE(error().find("cameras.txt line 1 lacks parameters"), std::string::npos) << error();

@@ -43,9 +43,12 @@ class ColmapCommand : public test::Command {
            " -o " + file(output) +
            " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2 ";
   }
-  nlohmann::json options_of(const std::string& output) const {
+  nlohmann::json record_of(const std::string& output) const {
     std::ifstream stream(folder_ / (output + "/result.json"));
-    return nlohmann::json::parse(stream)["options"];
+    return nlohmann::json::parse(stream);
+  }
+  nlohmann::json options_of(const std::string& output) const {
+    return record_of(output)["options"];
   }
   cv::Mat distance_in(const std::string& output) const {
     return cv::imread(file(output + "/distance0.tiff"), cv::IMREAD_UNCHANGED);
@@ -56,6 +59,7 @@ TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
   const Outcome colmap = run(depth("model", "colmap"));
   ASSERT_EQ(colmap.exit_code, 0) << colmap.output;
   EXPECT_NE(colmap.output.find("right.png: "), std::string::npos) << colmap.output;
+  EXPECT_EQ(record_of("colmap")["conventions"]["unit"], "that of the reconstruction");
   // From right.png, points at 1 and 4 are a little farther than from left.png.
   const nlohmann::json options = options_of("colmap");
   EXPECT_EQ(options["min_distance"], 0.75);
@@ -64,6 +68,7 @@ TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
       run(depth("same.yaml", "out") + "--min-distance " + options["min_distance"].dump() +
           " --max-distance " + options["max_distance"].dump());
   ASSERT_EQ(kalibr.exit_code, 0) << kalibr.output;
+  EXPECT_EQ(record_of("out")["conventions"]["unit"], "metre");
   ASSERT_GT(cv::countNonZero(distance_in("out")), 5000);
   EXPECT_EQ(cv::norm(distance_in("colmap"), distance_in("out"), cv::NORM_INF), 0);
 }

@@ -93,6 +93,13 @@ TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
   }
 }
 
+TEST(Pictures, DistanceLegendNamesTheUnit) {
+  const cv::Mat picture(100, 400, CV_8UC3, cv::Scalar(1, 2, 3));
+  const cv::Mat metres = with_distance_legend(picture, {1, 5});
+  EXPECT_EQ(cv::norm(metres, with_distance_legend(picture, {1, 5}, " m"), cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(metres, with_distance_legend(picture, {1, 5}, ""), cv::NORM_INF), 100);
+}
+
 TEST(Pictures, SheetHoldsAllPanels) {
   const cv::Mat grey(50, 80, CV_8UC1, cv::Scalar(9));
   const cv::Mat deep(100, 160, CV_16UC3, cv::Scalar(1000, 2000, 3000));
