@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,7 +19,7 @@ namespace {
 
 struct DepthArguments {
   std::vector<std::string> images;
-  int sources = 2;
+  std::optional<int> sources;
   std::string output;
   RigSettings rig;
   PoseSettings poses;
@@ -45,14 +46,18 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
 /// One image is joined by the best ones of its COLMAP model.
 std::vector<std::string> files_of(const DepthArguments& arguments) {
   std::vector<std::string> files = arguments.images;
-  if (files.size() > 1) return files;
+  if (files.size() > 1) {
+    if (!arguments.sources) return files;
+    throw ws::Error("--sources chooses what joins one image, but " + std::to_string(files.size()) +
+                    " were given; leave it out or give one.");
+  }
   if (!ws::is_colmap_model(arguments.rig.calibration)) {
     throw ws::Error(
         "One image is not enough, unless --calibration is a COLMAP model to choose "
         "others from; give two or more.");
   }
   const auto sources = ws::colmap_sources(arguments.rig.calibration, files.front(),
-                                          static_cast<std::size_t>(arguments.sources));
+                                          static_cast<std::size_t>(arguments.sources.value_or(2)));
   if (sources.empty()) {
     throw ws::Error(arguments.rig.calibration + " has no image that shares points with " +
                     files.front() + "; give two or more images.");
@@ -96,9 +101,8 @@ void add_depth_command(CLI::App& app) {
   add_image_options(*command, arguments->rig, arguments->poses);
   command
       ->add_option("--sources", arguments->sources,
-                   "How many others of the model join one image, best first")
-      ->check(CLI::Range(1, 7))
-      ->capture_default_str();
+                   "How many others of the model join one image, best first (default 2)")
+      ->check(CLI::Range(1, 7));
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record as JSON");

@@ -24,7 +24,9 @@ constexpr std::size_t fewest_points = 20;
 // As COLMAP's own dense stereo does.
 constexpr double quantile = 0.01;
 constexpr double margin = 0.25;
-constexpr double best_angle = 5;  // degrees
+// Degrees; Yao et al., MVSNet.
+constexpr double best_angle = 5;
+constexpr double deviation_below = 1, deviation_above = 10;
 
 using Points = std::unordered_map<std::uint64_t, Eigen::Vector3d>;
 
@@ -63,7 +65,7 @@ double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 /// How much a point tells that is seen under this angle (radians) from two images.
 double worth_of_angle(double angle) {
   const double degrees = angle * 180 / std::numbers::pi;
-  const double deviation = degrees < best_angle ? 1 : 10;
+  const double deviation = degrees < best_angle ? deviation_below : deviation_above;
   const double x = (degrees - best_angle) / deviation;
   return std::exp(-0.5 * x * x);
 }
@@ -176,12 +178,12 @@ std::vector<fs::path> colmap_sources(const fs::path& folder, const fs::path& fil
   std::vector<std::pair<double, std::string>> ranked;
   calibration::each_colmap_image(colmap_file(folder, "images"), [&](const ColmapImage& other) {
     if (other.name == image.name) return;
+    const Eigen::Vector3d other_centre = centre_of(other);
     double score = 0;
     for (const std::uint64_t number : other.points) {
       const auto point = points.find(number);
       if (point == points.end()) continue;
-      score +=
-          worth_of_angle(angle_between(point->second - centre, point->second - centre_of(other)));
+      score += worth_of_angle(angle_between(point->second - centre, point->second - other_centre));
     }
     if (score > 0) ranked.emplace_back(-score, other.name);
   });

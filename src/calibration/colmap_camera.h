@@ -11,8 +11,8 @@
 
 namespace widestereo::calibration {
 
-/// Parameters: one or two focal lengths, the principal point and the coefficients; none of the
-/// first two for panoramas.
+/// Its parameters: focal lengths (a panorama has none), the principal point (or a panorama's size),
+/// coefficients.
 struct ColmapModel {
   const char* name;
   std::size_t focal_lengths;

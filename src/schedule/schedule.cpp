@@ -224,15 +224,21 @@ class Builder {
     return pass;
   }
 
-  /// `over`: the view whose pixels the kernel runs over; `patches`: evaluated per pixel.
-  void add(Kernel kernel, kernel::PassParameters pass, int over, int patches) {
+  /// `over`: the view whose pixels the kernel runs over; `patches`: evaluated per pixel in every
+  /// source.
+  void add(Kernel kernel, const kernel::PassParameters& pass, int over, int patches) {
+    add_with_patches(kernel, pass, over, patches * (views_of_rig_ - 1));
+  }
+
+  /// The same, `patches` being those in all sources together.
+  void add_with_patches(Kernel kernel, kernel::PassParameters pass, int over, int patches) {
     const Camera& camera = schedule_.views[over].camera;
     const long long pixels = static_cast<long long>(camera.width) * camera.height;
     pass.first_row = 0;
     pass.last_row = camera.height;
     schedule_.dispatches.push_back(
         {kernel, pass, camera.width, camera.height,
-         pixels / (pass.colour < 0 ? 1 : 2) * patches * (views_of_rig_ - 1) *
+         pixels / (pass.colour < 0 ? 1 : 2) * patches *
              samples_of_patch(schedule_.constants.window_radius, schedule_.constants.pattern)});
   }
 
@@ -352,8 +358,8 @@ class Builder {
   void measure(int view, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.candidates = how;
-    // A sub-pixel match looks at one source, but counts as if it looked at all.
-    add(Kernel::measure, pass, view, (how & subpixel_match) != 0 ? 1 : 0);
+    // A sub-pixel match looks at the source that tells most.
+    add_with_patches(Kernel::measure, pass, view, (how & subpixel_match) != 0 ? 1 : 0);
   }
 
   /// The view must have been measured. `precision`: 0 leaves the distances as they are.

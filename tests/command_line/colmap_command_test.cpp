@@ -102,6 +102,7 @@ TEST_F(ColmapCommand, WhatItCannotTellIsAskedFor) {
 
 TEST_F(ColmapCommand, OptionsWithoutMeaningAreRefused) {
   folder_.write("poses.txt", "0 0 0 0 0 0 0 1\n1 0.1 0 0 0 0 0 1\n");
+  expect_error(depth("model", "out") + "--sources 1", "--sources chooses what joins one image");
   expect_error(depth("model", "out") + "--views 0,1", "--views has no meaning");
   expect_error(depth("model", "out") + "--poses " + file("poses.txt"), "--poses has no meaning");
   for (const char* camera : {"frames/cam0", "frames/cam1"}) {

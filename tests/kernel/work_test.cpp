@@ -85,5 +85,26 @@ TEST(Work, OfAScheduleAddsUp) {
   }
 }
 
+TEST(Work, OfASubPixelMatchIsAPatchInOneSource) {
+  Rig rig = fisheye_rig(64);
+  rig.views.push_back(rig.views[1]);
+  rig.views[2].world_from_camera.translation().y() += 0.1;
+  const Schedule schedule = make_schedule(rig, Options::preset_named("fast"));
+  const KernelConstants& constants = schedule.constants;
+  const long long samples = samples_of_patch(constants.window_radius, constants.pattern);
+  int measures = 0;
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    const long long pixels = static_cast<long long>(dispatch.width) * dispatch.height;
+    if (dispatch.kernel == Kernel::measure && dispatch.samples > 0) {
+      EXPECT_EQ(dispatch.samples, pixels * samples);
+      ++measures;
+    }
+    if (dispatch.kernel == Kernel::sweep) {
+      EXPECT_EQ(dispatch.samples % (2 * pixels * samples), 0);
+    }
+  }
+  EXPECT_EQ(measures, 3 * 3) << "one for each view and level";
+}
+
 }  // namespace
 }  // namespace widestereo::test
