@@ -17,6 +17,9 @@ namespace ws = widestereo;
 
 namespace {
 
+constexpr int most_images = 8;
+constexpr int default_sources = 2;
+
 struct DepthArguments {
   std::vector<std::string> images;
   std::optional<int> sources;
@@ -56,8 +59,9 @@ std::vector<std::string> files_of(const DepthArguments& arguments) {
         "One image is not enough, unless --calibration is a COLMAP model to choose "
         "others from; give two or more.");
   }
-  const auto sources = ws::colmap_sources(arguments.rig.calibration, files.front(),
-                                          static_cast<std::size_t>(arguments.sources.value_or(2)));
+  const auto sources =
+      ws::colmap_sources(arguments.rig.calibration, files.front(),
+                         static_cast<std::size_t>(arguments.sources.value_or(default_sources)));
   if (sources.empty()) {
     throw ws::Error(arguments.rig.calibration + " has no image that shares points with " +
                     files.front() + "; give two or more images.");
@@ -97,12 +101,13 @@ void add_depth_command(CLI::App& app) {
                    "LEFT RIGHT (or more views of one rig, or of a moving one); or one image of a "
                    "COLMAP model, which others join")
       ->required()
-      ->expected(1, 8);
+      ->expected(1, most_images);
   add_image_options(*command, arguments->rig, arguments->poses);
   command
       ->add_option("--sources", arguments->sources,
-                   "How many others of the model join one image, best first (default 2)")
-      ->check(CLI::Range(1, 7));
+                   "How many others of the model join one image, best first (default " +
+                       std::to_string(default_sources) + ")")
+      ->check(CLI::Range(1, most_images - 1));
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record as JSON");

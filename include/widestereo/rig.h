@@ -19,7 +19,8 @@ struct View {
   cv::Mat mask;  ///< empty, or CV_8UC1 of the camera's size, 0 = excluded
 };
 
-/// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a file).
+/// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a
+/// rig's file, the reconstruction's with read_colmap(), whose unit then stands for metres).
 struct Rig {
   std::vector<View> views;
   /// X = T X_imu in the common frame, metres; none where no IMU was calibrated.

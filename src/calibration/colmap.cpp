@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
 
 #include "calibration/colmap_files.h"
+#include "geometry/angle.h"
+#include "statistics/percentile.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -22,7 +23,7 @@ using calibration::ColmapImage;
 
 constexpr std::size_t fewest_points = 20;
 // As COLMAP's own dense stereo does.
-constexpr double quantile = 0.01;
+constexpr double outliers = 0.01;
 constexpr double margin = 0.25;
 // Degrees; Yao et al., MVSNet.
 constexpr double best_angle = 5;
@@ -39,9 +40,11 @@ std::size_t shared_end(const fs::path& path, const fs::path& name) {
   return is_end ? end.size() : 0;
 }
 
+fs::path whole_path(const fs::path& file) { return fs::absolute(file).lexically_normal(); }
+
 /// What is left of an image's file without its name in the model.
 fs::path folder_of_images(const fs::path& file, const fs::path& name) {
-  fs::path folder = fs::absolute(file).lexically_normal();
+  fs::path folder = whole_path(file);
   for (std::size_t i = shared_end(folder, name.lexically_normal()); i > 0; --i) {
     folder = folder.parent_path();
   }
@@ -58,13 +61,8 @@ Eigen::Vector3d centre_of(const ColmapImage& image) {
   return image.camera_from_world.inverse().translation();
 }
 
-double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
-
-/// How much a point tells that is seen under this angle (radians) from two images.
-double worth_of_angle(double angle) {
-  const double degrees = angle * 180 / std::numbers::pi;
+/// How much a point tells that is seen under this angle from two images.
+double worth_of_angle(double degrees) {
   const double deviation = degrees < best_angle ? deviation_below : deviation_above;
   const double x = (degrees - best_angle) / deviation;
   return std::exp(-0.5 * x * x);
@@ -74,7 +72,7 @@ double worth_of_angle(double angle) {
 std::vector<ColmapImage> images_of_files(const fs::path& folder,
                                          const std::vector<fs::path>& files) {
   std::vector<fs::path> paths;
-  for (const fs::path& file : files) paths.push_back(fs::absolute(file).lexically_normal());
+  for (const fs::path& file : files) paths.push_back(whole_path(file));
   std::vector<ColmapImage> images(files.size());
   std::vector<std::size_t> shared(files.size());
   std::size_t count = 0;
@@ -132,11 +130,8 @@ std::optional<DistanceRange> distances_of(const std::vector<ColmapImage>& images
     }
   }
   if (distances.size() < fewest_points) return std::nullopt;
-  std::sort(distances.begin(), distances.end());
-  const auto last = static_cast<double>(distances.size() - 1);
-  return DistanceRange{
-      .nearest = (1 - margin) * distances[static_cast<std::size_t>(quantile * last)],
-      .farthest = (1 + margin) * distances[static_cast<std::size_t>((1 - quantile) * last)]};
+  return DistanceRange{.nearest = (1 - margin) * percentile(distances, outliers),
+                       .farthest = (1 + margin) * percentile(distances, 1 - outliers)};
 }
 
 }  // namespace
@@ -183,7 +178,8 @@ std::vector<fs::path> colmap_sources(const fs::path& folder, const fs::path& fil
     for (const std::uint64_t number : other.points) {
       const auto point = points.find(number);
       if (point == points.end()) continue;
-      score += worth_of_angle(angle_between(point->second - centre, point->second - other_centre));
+      score +=
+          worth_of_angle(degrees_between(point->second - centre, point->second - other_centre));
     }
     if (score > 0) ranked.emplace_back(-score, other.name);
   });

@@ -8,6 +8,8 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/angle.h"
+#include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -49,14 +51,6 @@ std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
     }
   }
   return best;
-}
-
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto nth =
-      values.begin() + static_cast<long>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
 }
 
 /// Distance along the first ray to the point nearest to both rays, from the angles of the triangle.
@@ -108,8 +102,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
     if (!project(second.camera, ray_second - offset * plane, foot)) continue;
     pixels.push_back((foot - match.second).norm());
     angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees);
-    const double parallax =
-        std::atan2(rotated.cross(ray_second).norm(), rotated.dot(ray_second)) * degrees;
+    const double parallax = degrees_between(rotated, ray_second);
     if (pixels.back() >= 5 || parallax < 0.3) continue;
     const Eigen::Vector3d other = motion.linear().transpose() * ray_second;
     const Eigen::Vector3d centre = motion.inverse().translation();

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/angle.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -49,7 +50,7 @@ double angle_between(const cv::Vec3f& a, const cv::Vec3f& b) {
   const Eigen::Vector3d u(a[0], a[1], a[2]);
   const Eigen::Vector3d v(b[0], b[1], b[2]);
   if (u.norm() < 0.5 || v.norm() < 0.5) return -1;
-  return std::atan2(u.cross(v).norm(), u.dot(v)) * 180 / std::numbers::pi;
+  return degrees_between(u, v);
 }
 
 void require_maps(const cv::Mat& distance, const GroundTruth& truth, const View& reference) {

@@ -9,6 +9,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "statistics/percentile.h"
+
 namespace widestereo {
 namespace {
 
@@ -108,14 +110,8 @@ ColourRange robust_range(const cv::Mat& distance) {
     if (*it > 0 && std::isfinite(*it)) inverse.push_back(1 / *it);
   }
   if (inverse.empty()) return {1, 10};
-  const auto percentile = [&](double p) {
-    const auto nth =
-        inverse.begin() + static_cast<long>(p * static_cast<double>(inverse.size() - 1));
-    std::nth_element(inverse.begin(), nth, inverse.end());
-    return static_cast<double>(*nth);
-  };
-  const double low = percentile(0.02);
-  const double high = std::max(percentile(0.98), low * 1.01);
+  const double low = static_cast<double>(percentile(inverse, 0.02));
+  const double high = std::max(static_cast<double>(percentile(inverse, 0.98)), low * 1.01);
   return {1 / high, 1 / low};
 }
 

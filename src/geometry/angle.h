@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+
+namespace widestereo {
+
+/// In degrees; exact for small angles, too, which cosines are not.
+inline double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi;
+}
+
+}  // namespace widestereo
