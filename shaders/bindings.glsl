@@ -22,10 +22,11 @@ layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parame
 layout(set = 0, binding = 1) uniform sampler2DArray intensity_texture;
 layout(set = 0, binding = 2, r32f) uniform image2DArray intensities;
 layout(set = 0, binding = 3, rgba32f) readonly uniform image2DArray rays;
-layout(set = 0, binding = 4, rgba32f) uniform image2DArray hypotheses;  // and priors, in as many further layers
-layout(set = 0, binding = 5, rgba32f) uniform image2DArray checks;
+layout(set = 0, binding = 4, rgba32f) uniform image2DArray hypotheses;  // and, in further layers, priors and checks
+layout(set = 0, binding = 5) uniform sampler2DArray half_pixel_texture;
 layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
+layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
 layout(push_constant) uniform PassBlock { PassParameters pass; };
 
 vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, ivec3(p, view)); }
@@ -37,23 +38,30 @@ float intensity_at(int view, ivec2 p) {
 }
 
 // Texture coordinates of a position in texels of the memory.
-vec3 texture_position(int view, vec2 texel) {
-  vec2 texel_size = 1.0f / vec2(textureSize(intensity_texture, 0).xy);
+vec3 half_pixel_position(int view, vec2 texel) {
+  vec2 texel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
   return vec3(texel * texel_size, float(view));
 }
 
-vec4 intensity_taps(int view, ivec2 p) {
+vec4 half_pixel_taps(int view, ivec2 p) {
+  ivec2 texel = p + HALF_PIXEL_APRON;
   if (SAMPLED) {
     // The corner that the four texels share lies half a texel from any rounding trouble.
-    vec4 taps = textureGather(intensity_texture, texture_position(view, vec2(p + APRON + 1)));
+    vec4 taps = textureGather(half_pixel_texture, half_pixel_position(view, vec2(texel + 1)));
     return vec4(taps.w, taps.z, taps.x, taps.y);
   }
-  return vec4(intensity_at(view, p), intensity_at(view, p + ivec2(1, 0)),
-              intensity_at(view, p + ivec2(0, 1)), intensity_at(view, p + ivec2(1, 1)));
+  return vec4(imageLoad(half_pixels, ivec3(texel, view)).x,
+              imageLoad(half_pixels, ivec3(texel + ivec2(1, 0), view)).x,
+              imageLoad(half_pixels, ivec3(texel + ivec2(0, 1), view)).x,
+              imageLoad(half_pixels, ivec3(texel + ivec2(1, 1), view)).x);
 }
 
-float filtered_intensity_at(int view, vec2 texel) {
-  return textureLod(intensity_texture, texture_position(view, texel), 0.0f).x;
+float filtered_half_pixel(int view, vec2 texel) {
+  return textureLod(half_pixel_texture, half_pixel_position(view, texel), 0.0f).x;
+}
+
+void store_half_pixel(int view, ivec2 p, float intensity) {
+  imageStore(half_pixels, ivec3(p + HALF_PIXEL_APRON, view), vec4(intensity, 0.0f, 0.0f, 0.0f));
 }
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }
@@ -68,9 +76,9 @@ vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, VIEW_CO
 
 void store_prior(int view, ivec2 p, vec4 m) { imageStore(hypotheses, ivec3(p, VIEW_COUNT + view), m); }
 
-vec4 check_at(int view, ivec2 p) { return imageLoad(checks, ivec3(p, view)); }
+vec4 check_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, 2 * VIEW_COUNT + view)); }
 
-void store_check(int view, ivec2 p, vec4 c) { imageStore(checks, ivec3(p, view), c); }
+void store_check(int view, ivec2 p, vec4 c) { imageStore(hypotheses, ivec3(p, 2 * VIEW_COUNT + view), c); }
 
 int transfer_index(ivec2 p) { return p.y * parameters.cameras[pass.reference].size.x + p.x; }
 

@@ -9,6 +9,10 @@
 #define APRON 16
 #define MASKED_INTENSITY -1e30f
 
+// Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl). What a
+// bilinear sample touches up to a pixel outside is masked.
+#define HALF_PIXEL_APRON 2
+
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {
   vec4 row0;
@@ -42,8 +46,8 @@ struct PassParameters {
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
-  uint candidates;  // adaptive search: bit k: candidate kind k is tried; measuring: SUBPIXEL_MATCH;
-                    // regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN; filling: reasons not to fill
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
+                    // measuring: SUBPIXEL_MATCH; regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN; filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels

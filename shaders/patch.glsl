@@ -16,24 +16,25 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
-// Where a position lies in what sample_image() reads.
+// Where a position (pixels) lies in what sample_image() reads: in half pixels.
 FN vec2 texel_at(vec2 position, int filter_kind) {
-  if (filter_kind == FILTER_EXACT) return position;
-  return position + vec2(float(APRON) + 0.5f, float(APRON) + 0.5f);
+  vec2 texel = 2.0f * position;
+  if (filter_kind == FILTER_EXACT) return texel;
+  return texel + vec2(float(HALF_PIXEL_APRON) + 0.5f, float(HALF_PIXEL_APRON) + 0.5f);
 }
 
 // Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others, and every image
 // is surrounded by masked ones. The weights are exact, or those of the texture units (1/256 on most GPUs).
 FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
 #ifdef HAS_DEVICE_FILTER
-  if (FILTER == FILTER_DEVICE) return filtered_intensity_at(CONTEXT view, texel);
+  if (FILTER == FILTER_DEVICE) return filtered_half_pixel(CONTEXT view, texel);
 #endif
   // The limit comes first: then it also replaces what is no number.
-  float x = min(float(size.x), max(-1.0f, texel.x));
-  float y = min(float(size.y), max(-1.0f, texel.y));
+  float x = min(float(2 * size.x), max(-2.0f, texel.x));
+  float y = min(float(2 * size.y), max(-2.0f, texel.y));
   float left = floor(x);
   float top = floor(y);
-  vec4 taps = intensity_taps(CONTEXT view, ivec2(int(left), int(top)));
+  vec4 taps = half_pixel_taps(CONTEXT view, ivec2(int(left), int(top)));
   float across = x - left;
   float upper = taps.x + across * (taps.y - taps.x);
   float lower = taps.z + across * (taps.w - taps.z);
@@ -161,6 +162,13 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   if (!mapped) return true;
   if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, start.map)) return false;
   start.map.u0 = texel_at(start.map.u0, FILTER);
+  start.map.ux = 2.0f * start.map.ux;
+  start.map.uy = 2.0f * start.map.uy;
+  if (WARP == WARP_QUADRATIC) {
+    start.map.uxx = 2.0f * start.map.uxx;
+    start.map.uxy = 2.0f * start.map.uxy;
+    start.map.uyy = 2.0f * start.map.uyy;
+  }
   return true;
 }
 

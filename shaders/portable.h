@@ -7,9 +7,11 @@
 // A back end provides, before including the algorithm:
 //   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
 //   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON pixels outside
-//   vec4  intensity_taps(view, pixel)       of pixel, its right, lower and lower right neighbour
-//   float filtered_intensity_at(view, texel) bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
-//                                           its centre at APRON + 0.5; only with HAS_DEVICE_FILTER
+//   vec4  half_pixel_taps(view, texel)      intensities at a half pixel (0, 0: pixel 0, 0; 1, 0: half a pixel to its
+//                                           right), its right, lower and lower right neighbour
+//   float filtered_half_pixel(view, texel)  bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
+//                                           its centre at HALF_PIXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
+//   void  store_half_pixel(view, texel, intensity)
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
 //   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl.
 #ifndef WIDESTEREO_PORTABLE_H

@@ -5,6 +5,7 @@
 
 using widestereo::DistanceSampling;
 using widestereo::Filter;
+using widestereo::Interpolation;
 using widestereo::Options;
 using widestereo::PatchPattern;
 using widestereo::PatchWarp;
@@ -76,7 +77,11 @@ void MatchSettings::add_to(CLI::App& command) {
       ->transform(CLI::CheckedTransformer(std::map<std::string, PatchPattern>{
           {"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
   add("--weight-scale", weight_scale, "Intensity scale of patch weights, grey levels; 0 = none");
-  add("--filter", filter, "Intensities between pixels: exact, or device (texture units of a GPU)")
+  add("--interpolation", interpolation,
+      "Intensities halfway between a source's pixels: linear or cubic")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Interpolation>{
+          {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}}));
+  add("--filter", filter, "Bilinear samples of those: exact, or device (texture units of a GPU)")
       ->transform(filter_names());
   add("--levels", levels, "Levels of the image pyramid");
   add("--sweep-steps", sweep_steps, "Inverse distances tried at the coarsest level");
@@ -142,6 +147,7 @@ Options MatchSettings::options() const {
   take(options.refinements, refinements);
   take(options.pattern, pattern);
   take(options.weight_scale, weight_scale);
+  take(options.interpolation, interpolation);
   take(options.filter, filter);
   take(options.levels, levels);
   take(options.sweep_steps, sweep_steps);

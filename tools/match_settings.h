@@ -33,6 +33,7 @@ struct MatchSettings {
   std::optional<std::vector<int>> level_iterations, level_regressions;
   std::optional<widestereo::PatchPattern> pattern;
   std::optional<widestereo::PatchWarp> warp;
+  std::optional<widestereo::Interpolation> interpolation;
   std::optional<widestereo::Filter> filter;
   std::optional<widestereo::DistanceSampling> sampling;
   std::optional<widestereo::Propagation> propagation;

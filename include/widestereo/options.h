@@ -32,12 +32,17 @@ enum class PatchPattern : int {
   checkerboard = 1,  ///< every other one
 };
 
-/// How intensities between pixels are found, always bilinear (values of the kernels,
-/// shaders/patch.glsl).
+/// Intensities halfway between a source's pixels, from which the others follow bilinearly.
+enum class Interpolation : int {
+  linear = 0,  ///< means of the pixels: bilinear between pixels, too
+  cubic = 1,   ///< of Catmull and Rom's spline: keeps fine texture, as the reference has it
+};
+
+/// How half pixels are sampled, always bilinearly (values of the kernels, shaders/patch.glsl).
 enum class Filter : int {
   exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
   device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their
-               ///< positions are rounded, to 1/256 pixel on most. On CPUs exact
+               ///< positions are rounded, to 1/512 pixel on most. On CPUs exact
 };
 
 /// How planes are found.
@@ -68,7 +73,8 @@ struct Options {
   /// Weight (1 + |difference| / (8 scale))^-8, about exp(-|difference| / scale), of a sample whose
   /// intensity differs from the centre's, grey levels of 255; 0 = all weigh the same.
   double weight_scale = 0;
-  Filter filter = Filter::device;  ///< how samples between pixels are read
+  Interpolation interpolation = Interpolation::linear;
+  Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid.
   int levels = 3;                                 ///< each half the size of the finer one, 1..4

@@ -37,7 +37,8 @@ constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
     kernel::cpu::adopt_fill_pixel,
     kernel::cpu::vote_pixel,
     kernel::cpu::transfer_keep_pixel,
-    kernel::cpu::renew_pixel};
+    kernel::cpu::renew_pixel,
+    kernel::cpu::interpolate_pixel};
 
 class CpuBackend final : public Backend {
  public:
@@ -46,7 +47,7 @@ class CpuBackend final : public Backend {
     for (std::size_t i = 0; i < sizes.size(); ++i) {
       views_[i].set_size(sizes[i]);
       bytes_ += static_cast<std::size_t>(sizes[i].area()) * 4 * sizeof(cv::Vec4f) +
-                views_[i].intensities.total() * sizeof(float);
+                (views_[i].intensities.total() + views_[i].half_pixels.total()) * sizeof(float);
       largest = {std::max(largest.width, sizes[i].width),
                  std::max(largest.height, sizes[i].height)};
     }

@@ -14,6 +14,7 @@ namespace widestereo::kernel::cpu {
 struct ViewMemory {
   cv::Mat_<cv::Vec4f> rays;
   cv::Mat_<float> intensities;  ///< surrounded by APRON masked pixels
+  cv::Mat_<float> half_pixels;  ///< by HALF_PIXEL_APRON masked half pixels
   cv::Mat_<cv::Vec4f> hypotheses;
   cv::Mat_<cv::Vec4f> checks;
   cv::Mat_<cv::Vec4f> priors;
@@ -21,6 +22,7 @@ struct ViewMemory {
   void set_size(cv::Size size) {
     for (cv::Mat_<cv::Vec4f>* map : {&rays, &hypotheses, &checks, &priors}) map->create(size);
     intensities = cv::Mat_<float>(with_apron(size), MASKED_INTENSITY);
+    half_pixels = cv::Mat_<float>(size_of_half_pixels(size), MASKED_INTENSITY);
   }
   /// The intensities without the apron.
   cv::Mat_<float> image() { return intensities(cv::Rect({APRON, APRON}, rays.size())); }
@@ -52,10 +54,16 @@ inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
 inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return context.views[view].intensities(p.y + APRON, p.x + APRON);
 }
-inline vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
-  const float* top = &context.views[view].intensities(p.y + APRON, p.x + APRON);
-  const float* bottom = &context.views[view].intensities(p.y + APRON + 1, p.x + APRON);
+inline float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return &context.views[view].half_pixels(p.y + HALF_PIXEL_APRON, p.x + HALF_PIXEL_APRON);
+}
+inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+  const float* top = half_pixel_address(CONTEXT view, p);
+  const float* bottom = half_pixel_address(CONTEXT view, ivec2(p.x, p.y + 1));
   return {top[0], top[1], bottom[0], bottom[1]};
+}
+inline void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
+  *half_pixel_address(CONTEXT view, p) = intensity;
 }
 inline void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
   context.views[view].intensities(p.y + APRON, p.x + APRON) = intensity;
@@ -115,6 +123,7 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "patch.glsl"
 #include "search.glsl"
 #include "pyramid.glsl"
+#include "interpolation.glsl"
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
 #include "regression.glsl"

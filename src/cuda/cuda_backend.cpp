@@ -104,18 +104,17 @@ void CudaBackend::make_maps() {
     const std::string& name = target_.name;
     ViewMaps& maps = maps_.emplace_back();
     maps.rays = DeviceArray<float4>(pixels, name, "the viewing rays");
-    maps.intensities = DeviceImage(size, name);
+    maps.intensities = DeviceImage(with_apron(size), APRON, name);
+    maps.half_pixels = DeviceImage(size_of_half_pixels(size), HALF_PIXEL_APRON, name);
+    maps.texture = maps.half_pixels.make_texture(name);
     maps.hypotheses = DeviceArray<float4>(pixels, name, "the planes");
     maps.checks = DeviceArray<float4>(pixels, name, "the consistency maps");
     maps.priors = DeviceArray<float4>(pixels, name, "the planes' priors");
-    context_.views[maps_.size() - 1] = {maps.rays.get(),
-                                        maps.intensities.get(),
-                                        maps.intensities.texture(),
-                                        maps.hypotheses.get(),
-                                        maps.checks.get(),
-                                        maps.priors.get(),
-                                        size.width,
-                                        maps.intensities.stride()};
+    context_.views[maps_.size() - 1] = {maps.rays.get(),           maps.intensities.get(),
+                                        maps.half_pixels.get(),    maps.texture.get(),
+                                        maps.hypotheses.get(),     maps.checks.get(),
+                                        maps.priors.get(),         size.width,
+                                        maps.intensities.stride(), maps.half_pixels.stride()};
     largest = std::max(largest, pixels);
   }
   transfer_nearest_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
@@ -130,8 +129,8 @@ std::size_t CudaBackend::device_bytes() const {
       transfer_nearest_.bytes() + transfer_winner_.bytes() + of_run_.parameters.bytes();
   for (const Prepared& prepared : prepared_) bytes += prepared.parameters.bytes();
   for (const ViewMaps& maps : maps_) {
-    bytes += maps.rays.bytes() + maps.intensities.bytes() + maps.hypotheses.bytes() +
-             maps.checks.bytes() + maps.priors.bytes();
+    bytes += maps.rays.bytes() + maps.intensities.bytes() + maps.half_pixels.bytes() +
+             maps.hypotheses.bytes() + maps.checks.bytes() + maps.priors.bytes();
   }
   return bytes;
 }

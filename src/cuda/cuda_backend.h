@@ -49,7 +49,8 @@ class CudaBackend final : public Backend {
  private:
   struct ViewMaps {
     DeviceArray<float4> rays, hypotheses, checks, priors;
-    DeviceImage intensities;
+    DeviceImage intensities, half_pixels;
+    CudaTexture texture;  // of the half pixels; destroyed before them
   };
   /// Consecutive launches between two events.
   struct Stretch {

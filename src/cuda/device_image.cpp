@@ -3,28 +3,30 @@
 
 #include <vector>
 
-#include "matching/backend.h"
+#include "kernel/host.h"
 
 namespace widestereo {
 
-DeviceImage::DeviceImage(cv::Size size, const std::string& device) {
-  const cv::Size all = with_apron(size);
+DeviceImage::DeviceImage(cv::Size size, int apron, const std::string& device)
+    : size_(size), apron_(apron) {
   // Rows of whole cache lines, which are also what textures ask for.
   constexpr int line = 128 / sizeof(float);
-  stride_ = (all.width + line - 1) / line * line;
+  stride_ = (size.width + line - 1) / line * line;
   const std::size_t count =
-      static_cast<std::size_t>(stride_) * static_cast<std::size_t>(all.height);
+      static_cast<std::size_t>(stride_) * static_cast<std::size_t>(size.height);
   memory_ = DeviceArray<float>(count, device, "the images");
   const std::vector<float> masked(count, MASKED_INTENSITY);
   check(cudaMemcpy(memory_.get(), masked.data(), memory_.bytes(), cudaMemcpyHostToDevice), device,
         "clear the images");
+}
 
+CudaTexture DeviceImage::make_texture(const std::string& device) const {
   cudaResourceDesc resource{};
   resource.resType = cudaResourceTypePitch2D;
   resource.res.pitch2D.devPtr = memory_.get();
   resource.res.pitch2D.desc = cudaCreateChannelDesc(32, 0, 0, 0, cudaChannelFormatKindFloat);
-  resource.res.pitch2D.width = static_cast<std::size_t>(all.width);
-  resource.res.pitch2D.height = static_cast<std::size_t>(all.height);
+  resource.res.pitch2D.width = static_cast<std::size_t>(size_.width);
+  resource.res.pitch2D.height = static_cast<std::size_t>(size_.height);
   resource.res.pitch2D.pitchInBytes = static_cast<std::size_t>(stride_) * sizeof(float);
   // Beyond the memory lies what is at its rim: masked.
   cudaTextureDesc how{};
@@ -35,7 +37,7 @@ DeviceImage::DeviceImage(cv::Size size, const std::string& device) {
   cudaTextureObject_t texture = 0;
   check(cudaCreateTextureObject(&texture, &resource, &how, nullptr), device,
         "make a texture of an image");
-  texture_ = CudaTexture(texture);
+  return CudaTexture(texture);
 }
 
 }  // namespace widestereo

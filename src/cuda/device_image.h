@@ -9,27 +9,28 @@
 
 namespace widestereo {
 
-/// Device memory of a view's intensities: masked everywhere, APRON pixels wider than the image on
-/// every side, with a texture over it.
+/// Device memory of a view's intensities: masked everywhere.
 class DeviceImage {
  public:
   DeviceImage() = default;
-  /// Throws Error naming the device. The memory may be filled after the constructor returns, on the
-  /// default stream.
-  DeviceImage(cv::Size size, const std::string& device);
+  /// `size`: with the aprons of this many pixels on every side. Throws Error naming the device. The
+  /// memory may be filled after the constructor returns, on the default stream.
+  DeviceImage(cv::Size size, int apron, const std::string& device);
 
   /// Of pixel (0, 0).
-  float* get() const { return memory_.get() + (stride_ + 1) * APRON; }
-  /// Bilinear, in pixels of the memory: the image's first one has its centre at APRON + 0.5.
-  cudaTextureObject_t texture() const { return texture_.get(); }
+  float* get() const { return memory_.get() + (stride_ + 1) * apron_; }
+  /// Bilinear, in pixels of the memory: the image's first one has its centre at its apron + 0.5.
+  /// The image must outlive it. Throws Error naming the device.
+  CudaTexture make_texture(const std::string& device) const;
   /// Pixels from row to row.
   int stride() const { return stride_; }
   std::size_t bytes() const { return memory_.bytes(); }
 
  private:
+  cv::Size size_;
+  int apron_ = 0;
   int stride_ = 0;
   DeviceArray<float> memory_;
-  CudaTexture texture_;  // destroyed before the memory
 };
 
 }  // namespace widestereo

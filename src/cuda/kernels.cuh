@@ -41,7 +41,7 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 
 /// The algorithm as static functions of a class, which makes its constants template arguments.
 ///
-/// Textures lie over plain memory, which `downsample` writes like any other; gathering four texels
+/// Textures lie over plain memory, which `interpolate` writes like any other; gathering four texels
 /// would need a CUDA array, so that exact filtering takes four loads. No kernel reads intensities
 /// or rays that it writes, as textures and __ldg() ask; hypotheses, checks and priors are read and
 /// written by the same kernels and are loaded normally.
@@ -62,13 +62,19 @@ struct Algorithm {
   FN float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
     return __ldg(intensity_address(CONTEXT view, p));
   }
-  FN vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
-    const float* top = intensity_address(CONTEXT view, p);
-    const float* bottom = top + context.views[view].stride;
+  FN float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return context.views[view].half_pixels + (p.y * context.views[view].half_pixel_stride + p.x);
+  }
+  FN vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+    const float* top = half_pixel_address(CONTEXT view, p);
+    const float* bottom = top + context.views[view].half_pixel_stride;
     return vec4(__ldg(top), __ldg(top + 1), __ldg(bottom), __ldg(bottom + 1));
   }
-  FN float filtered_intensity_at(CONTEXT_ARGUMENT int view, vec2 texel) {
+  FN float filtered_half_pixel(CONTEXT_ARGUMENT int view, vec2 texel) {
     return tex2D<float>(context.views[view].texture, texel.x, texel.y);
+  }
+  FN void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
+    *half_pixel_address(CONTEXT view, p) = intensity;
   }
   FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
     *intensity_address(CONTEXT view, p) = intensity;
@@ -116,6 +122,7 @@ struct Algorithm {
 #include "patch.glsl"
 #include "search.glsl"
 #include "pyramid.glsl"
+#include "interpolation.glsl"
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
 #include "regression.glsl"
@@ -165,6 +172,7 @@ ENTRY_POINT(adopt_fill, reference)
 ENTRY_POINT(vote, reference)
 ENTRY_POINT(transfer_keep, reference)
 ENTRY_POINT(renew, reference)
+ENTRY_POINT(interpolate, reference)
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}

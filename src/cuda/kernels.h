@@ -17,12 +17,14 @@ constexpr int block_height = 8;
 struct ViewMemory {
   const float4* rays;
   float* intensities;           ///< of pixel (0, 0); APRON masked ones surround the image
-  cudaTextureObject_t texture;  ///< over the same memory, bilinear; its (0, 0) is in the apron
+  float* half_pixels;           ///< likewise; HALF_PIXEL_APRON masked ones surround them
+  cudaTextureObject_t texture;  ///< over the half pixels, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
   float4* checks;
   float4* priors;
   int width;
-  int stride;  ///< of the intensities: pixels from row to row
+  int stride;             ///< of the intensities: pixels from row to row
+  int half_pixel_stride;  ///< likewise
 };
 
 /// What a kernel sees besides its pixel: the one argument of every kernel.

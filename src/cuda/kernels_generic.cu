@@ -23,7 +23,8 @@ KernelTable generic_kernels() {
                                         KERNEL_ENTRY(adopt_fill, C),
                                         KERNEL_ENTRY(vote, C),
                                         KERNEL_ENTRY(transfer_keep, C),
-                                        KERNEL_ENTRY(renew, C)};
+                                        KERNEL_ENTRY(renew, C),
+                                        KERNEL_ENTRY(interpolate, C)};
   return table_of(entries);
 }
 

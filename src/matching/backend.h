@@ -39,6 +39,10 @@ class ScheduleProgress {
 inline cv::Size with_apron(cv::Size size) {
   return {size.width + 2 * APRON, size.height + 2 * APRON};
 }
+/// Likewise of its half pixels.
+inline cv::Size size_of_half_pixels(cv::Size size) {
+  return {2 * (size.width + HALF_PIXEL_APRON), 2 * (size.height + HALF_PIXEL_APRON)};
+}
 
 /// Memory and kernels for matches of fixed sizes on one device. All maps have their view's size.
 class Backend {

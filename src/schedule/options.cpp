@@ -15,6 +15,8 @@ NLOHMANN_JSON_SERIALIZE_ENUM(DistanceSampling, {{DistanceSampling::uniform, "uni
                                                 {DistanceSampling::inverse, "inverse"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(PatchPattern, {{PatchPattern::dense, "dense"},
                                             {PatchPattern::checkerboard, "checkerboard"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(Interpolation,
+                             {{Interpolation::linear, "linear"}, {Interpolation::cubic, "cubic"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(Filter, {{Filter::exact, "exact"}, {Filter::device, "device"}})
 NLOHMANN_JSON_SERIALIZE_ENUM(SearchMethod,
                              {{SearchMethod::random, "random"}, {SearchMethod::pyramid, "pyramid"}})
@@ -40,6 +42,7 @@ Options Options::preset_named(const std::string& name) {
   options.warp = PatchWarp::affine;
   options.sampling = DistanceSampling::inverse;
   options.window_radius = 4;
+  options.interpolation = Interpolation::cubic;
   options.weight_scale = 12;
   options.min_texture = 0;
   options.max_cost = 0.8;
@@ -124,6 +127,7 @@ std::string to_json(const Options& o) {
                                        {"window_radius", o.window_radius},
                                        {"pattern", o.pattern},
                                        {"weight_scale", o.weight_scale},
+                                       {"interpolation", o.interpolation},
                                        {"filter", o.filter},
                                        {"levels", o.levels},
                                        {"sweep_steps", o.sweep_steps},

@@ -92,6 +92,8 @@ constexpr unsigned random_distance = 1u << 11;
 constexpr unsigned surroundings = 1u << 12;
 constexpr unsigned source_planes = 1u << 13;
 constexpr unsigned normal = 1u << 9;
+// Of shaders/interpolation.glsl.
+constexpr unsigned interpolate_cubic = 1;
 // Of shaders/regression.glsl.
 constexpr unsigned subpixel_match = 1;
 constexpr unsigned regress_normals = 1;
@@ -128,6 +130,7 @@ class Builder {
   }
 
   Schedule build_cold() {
+    interpolate(0);
     if (options_.search == SearchMethod::pyramid) {
       build_pyramid();
     } else {
@@ -137,6 +140,7 @@ class Builder {
   }
 
   Schedule build_warm() {
+    interpolate(0);
     for (const int view : views_of(0)) move_on(view);
     if (options_.search == SearchMethod::pyramid) {
       search_warm();
@@ -153,6 +157,15 @@ class Builder {
     return std::move(schedule_);
   }
 
+  /// Sources are read at half pixels; the intensities of this level must be there.
+  void interpolate(int level) {
+    for (const int view : views_of(level)) {
+      kernel::PassParameters pass = pass_of(view);
+      pass.candidates = options_.interpolation == Interpolation::cubic ? interpolate_cubic : 0;
+      add(Kernel::interpolate, pass, view, 0);
+    }
+  }
+
   void build_random() {
     start_at_random(0);
     iterate(0, options_.first_iterations);
@@ -165,6 +178,7 @@ class Builder {
   void build_pyramid() {
     for (int level = 1; level < levels_; ++level) {
       for (const int view : views_of(level)) add_between_levels(Kernel::downsample, view, -1, 0);
+      interpolate(level);
     }
     for (int level = levels_ - 1; level >= 0; --level) {
       for (const int view : views_of(level)) {
@@ -454,7 +468,8 @@ const char* to_string(Kernel kernel) {
                                                                   "adopt_fill",
                                                                   "vote",
                                                                   "transfer_keep",
-                                                                  "renew"};
+                                                                  "renew",
+                                                                  "interpolate"};
   return names[static_cast<std::size_t>(kernel)];
 }
 

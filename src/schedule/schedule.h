@@ -33,8 +33,9 @@ enum class Kernel {
   vote,              ///< planes which most of the planes around agree with
   transfer_keep,     ///< keeps a view's own planes, moved on from the previous frame
   renew,             ///< starts a view from those
+  interpolate,       ///< intensities of a view at half pixels
 };
-inline constexpr int kernel_count = 20;
+inline constexpr int kernel_count = 21;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).

@@ -16,9 +16,14 @@ constexpr int map_row_quadratic = 32;
 constexpr int map_offset_affine = 4;
 constexpr int map_offset_quadratic = 8;
 constexpr int map_axis = 15;
+constexpr int slopes_in_texels = 4;
+constexpr int bends_in_texels = 6;
 constexpr int map_corners = 9;
 constexpr int weight_of_sample = 7;  // a product, growth() and a division
 constexpr int zncc_cost = 15;        // and the visible share's limit
+
+/// Half pixels; in the memory of texture units they begin elsewhere.
+int texel_at(int filter) { return filter == static_cast<int>(Filter::exact) ? 2 : 4; }
 
 /// Texture units filter by themselves.
 int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) ? 11 : 0; }
@@ -62,10 +67,11 @@ enum Map : unsigned {
   half_of_planes = 128,     // one colour's
   quarter_of_planes = 256,  // the coarser level's
   finer_intensities = 512,
+  half_pixels = 1024,
 };
 
 int bytes_of(unsigned maps) {
-  constexpr std::array<int, 10> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16};
+  constexpr std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, 16};
   int sum = 0;
   for (unsigned i = 0; i < bytes.size(); ++i) {
     if ((maps >> i & 1) != 0) sum += bytes[i];
@@ -82,14 +88,14 @@ struct Traffic {
 Traffic traffic_of(const Dispatch& dispatch) {
   constexpr unsigned seen = ray | intensity;
   const bool patches = dispatch.samples > 0;
-  const unsigned in_sources = patches ? static_cast<unsigned>(intensity) : 0;
+  const unsigned in_sources = patches ? static_cast<unsigned>(half_pixels) : 0;
   switch (dispatch.kernel) {
     case Kernel::initialise:
-      return {seen, intensity, plane};
+      return {seen, half_pixels, plane};
     case Kernel::iterate:
-      return {seen | plane, intensity, half_of_planes};
+      return {seen | plane, half_pixels, half_of_planes};
     case Kernel::iterate_raster:
-      return {seen | plane, intensity, plane};
+      return {seen | plane, half_pixels, plane};
     case Kernel::transfer_clear:
       return {0, 0, nearest | winner};
     case Kernel::transfer_nearest:
@@ -97,34 +103,36 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::transfer_winner:
       return {ray | plane | nearest, 0, winner};
     case Kernel::transfer_gather:
-      return {seen | winner | plane, intensity, plane};
+      return {seen | winner | plane, half_pixels, plane};
     case Kernel::check:
       return {seen | plane, plane | in_sources, checks};
+    case Kernel::interpolate:
+      return {intensity, 0, half_pixels};
     case Kernel::downsample:
       return {finer_intensities, 0, intensity};
     case Kernel::sweep:
-      return {seen, intensity, plane};
+      return {seen, half_pixels, plane};
     case Kernel::upsample:
-      return {seen | quarter_of_planes, intensity, plane};
+      return {seen | quarter_of_planes, half_pixels, plane};
     case Kernel::search:
-      return {seen | plane, intensity, half_of_planes};
+      return {seen | plane, half_pixels, half_of_planes};
     case Kernel::measure:
       return {seen | plane, plane | in_sources, checks};
     case Kernel::regress:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:
       if (!patches) return {prior | plane | ray | checks, 0, plane | checks};
-      return {prior | plane | seen, intensity, plane};
+      return {prior | plane | seen, half_pixels, plane};
     case Kernel::fill:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt_fill:
-      return {prior | checks | seen, intensity, plane | checks};
+      return {prior | checks | seen, half_pixels, plane | checks};
     case Kernel::vote:
       return {seen | plane, 0, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
     case Kernel::renew:
-      return {seen | prior, intensity, plane};
+      return {seen | prior, half_pixels, plane};
   }
   return {};
 }
@@ -140,16 +148,18 @@ PatchOperations patch_operations(const KernelConstants& c) {
   // Two differences from the centre, two sums of weights, five of intensities and their products.
   const int sums = 2 + 2 + 8 + (c.weighted != 0 ? 2 : 0);
   PatchOperations operations;
-  operations.of_sample =
-      weighting + (exact ? warp_ray : map_offset) + sample_image(c.filter) + sums;
-  operations.of_patch = side_of_source + is_ray + warp_ray + sample_image(c.filter) + zncc_cost;
+  operations.of_sample = weighting + (exact ? warp_ray + texel_at(c.filter) : map_offset) +
+                         sample_image(c.filter) + sums;
+  operations.of_patch =
+      side_of_source + is_ray + warp_ray + texel_at(c.filter) + sample_image(c.filter) + zncc_cost;
   if (!exact) {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;
-    operations.of_patch += anchors * (is_ray + warp_ray) + 2 * map_axis +
+    operations.of_patch += anchors * (is_ray + warp_ray) + 2 * map_axis + texel_at(c.filter) +
+                           slopes_in_texels +
                            rows * (quadratic ? map_row_quadratic : map_row_affine);
   }
-  if (quadratic) operations.of_patch += map_corners;
+  if (quadratic) operations.of_patch += map_corners + bends_in_texels;
   return operations;
 }
 

@@ -84,9 +84,10 @@ void Pipelines::make_layouts(const VulkanContext& context) {
       binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
-      binding(binding_checks, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_half_pixel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
       binding(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
+      binding(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
   };
   VkDescriptorSetLayoutCreateInfo set_info{};
   set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;

@@ -15,9 +15,10 @@ enum Binding : std::uint32_t {
   binding_intensities = 2,
   binding_rays = 3,
   binding_hypotheses = 4,
-  binding_checks = 5,
+  binding_half_pixel_texture = 5,
   binding_nearest = 6,
   binding_winner = 7,
+  binding_half_pixels = 8,
 };
 
 /// One compute pipeline for each kernel (iterate_raster, which is sequential, excepted),

@@ -146,13 +146,16 @@ void VulkanBackend::make_images(const VulkanContext& context) {
                           VK_IMAGE_USAGE_TRANSFER_DST_BIT,
                       purpose);
   };
-  intensities_ = make_image(
-      context, intensity_format, with_apron(size), layers,
-      VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-      "the images");
+  const auto make_intensities = [&](cv::Size with_rim, const char* purpose) {
+    return make_image(
+        context, intensity_format, with_rim, layers,
+        VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
+        purpose);
+  };
+  intensities_ = make_intensities(with_apron(size), "the images");
+  half_pixels_ = make_intensities(size_of_half_pixels(size), "the images at half pixels");
   rays_ = make_map(layers, "the viewing rays");
-  hypotheses_ = make_map(2 * layers, "the planes and their priors");
-  checks_ = make_map(layers, "the consistency maps");
+  hypotheses_ = make_map(3 * layers, "the planes, their priors and the consistency maps");
   parameters_ = make_device_buffer(
       context, sizeof(kernel::MatchParameters),
       VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the parameters");
@@ -167,7 +170,7 @@ void VulkanBackend::make_descriptor_set() {
   const DeviceFunctions& vk = context_.vk();
   const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1},
-      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1},
+      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2},
       {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4},
       {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2},
   }};
@@ -211,7 +214,7 @@ void VulkanBackend::make_descriptor_set() {
   const VkDescriptorImageInfo intensities = image_info(intensities_, sampler_.get());
   const VkDescriptorImageInfo rays = image_info(rays_, VK_NULL_HANDLE);
   const VkDescriptorImageInfo hypotheses = image_info(hypotheses_, VK_NULL_HANDLE);
-  const VkDescriptorImageInfo checks = image_info(checks_, VK_NULL_HANDLE);
+  const VkDescriptorImageInfo half_pixels = image_info(half_pixels_, sampler_.get());
   const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
   const VkDescriptorBufferInfo nearest = buffer_info(transfer_nearest_);
   const VkDescriptorBufferInfo winner = buffer_info(transfer_winner_);
@@ -221,7 +224,9 @@ void VulkanBackend::make_descriptor_set() {
   write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &intensities, nullptr);
   write(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &rays, nullptr);
   write(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &hypotheses, nullptr);
-  write(binding_checks, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &checks, nullptr);
+  write(binding_half_pixel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &half_pixels,
+        nullptr);
+  write(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &half_pixels, nullptr);
   write(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &nearest);
   write(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &winner);
   vk.vkUpdateDescriptorSets(context_.device(), static_cast<std::uint32_t>(writes.size()),
@@ -232,12 +237,13 @@ void VulkanBackend::clear_images() {
   const VkCommandBuffer commands = submissions_[0]->begin();
   VkClearColorValue masked{};
   masked.float32[0] = MASKED_INTENSITY;
-  for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
+  for (const LayeredImage* image : {&intensities_, &half_pixels_, &rays_, &hypotheses_}) {
     const VkImageSubresourceRange all =
-        layers_of(0, image == &hypotheses_ ? 2 * sizes_.size() : sizes_.size());
+        layers_of(0, image == &hypotheses_ ? 3 * sizes_.size() : sizes_.size());
     transition(commands, *image, all, VK_IMAGE_LAYOUT_UNDEFINED,
                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
-    const VkClearColorValue value = image == &intensities_ ? masked : VkClearColorValue{};
+    const bool is_map = image == &rays_ || image == &hypotheses_;
+    const VkClearColorValue value = is_map ? VkClearColorValue{} : masked;
     context_.vk().vkCmdClearColorImage(commands, image->handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &value, 1, &all);
     transition(commands, *image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
@@ -296,16 +302,16 @@ void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& m
   submissions_[0]->wait();
 }
 
-cv::Mat VulkanBackend::download(const LayeredImage& image, int view) {
+cv::Mat VulkanBackend::download(const LayeredImage& image, int view, int layer) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange layer = layers_of(view, 1);
-  const VkBufferImageCopy region = whole_layer(view, size, 0);
-  transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+  const VkImageSubresourceRange range = layers_of(layer, 1);
+  const VkBufferImageCopy region = whole_layer(layer, size, 0);
+  transition(commands, image, range, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
   context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging_.handle.get(),
                                        1, &region);
-  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
+  transition(commands, image, range, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
   barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();
@@ -321,12 +327,14 @@ void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
 void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
   upload(hypotheses_, view, hypotheses, CV_32FC4, 0);
 }
-cv::Mat VulkanBackend::hypotheses(int view) { return download(hypotheses_, view); }
-cv::Mat VulkanBackend::checks(int view) { return download(checks_, view); }
+cv::Mat VulkanBackend::hypotheses(int view) { return download(hypotheses_, view, view); }
+cv::Mat VulkanBackend::checks(int view) {
+  return download(hypotheses_, view, 2 * static_cast<int>(sizes_.size()) + view);
+}
 
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;
-  for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_, &checks_}) {
+  for (const LayeredImage* image : {&intensities_, &half_pixels_, &rays_, &hypotheses_}) {
     bytes += image->bytes;
   }
   for (const Buffer* buffer : {&parameters_, &transfer_nearest_, &transfer_winner_, &staging_}) {

@@ -66,7 +66,7 @@ class VulkanBackend final : public Backend {
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
   /// `apron`: where the map begins in the image, both ways.
   void upload(const LayeredImage& image, int view, const cv::Mat& map, int type, int apron);
-  cv::Mat download(const LayeredImage& image, int view);
+  cv::Mat download(const LayeredImage& image, int view, int layer);
 
   const VulkanContext& context_;
   std::vector<cv::Size> sizes_;
@@ -75,8 +75,8 @@ class VulkanBackend final : public Backend {
   Pipelines pipelines_;
   LayeredImage intensities_;
   LayeredImage rays_;
-  LayeredImage hypotheses_;
-  LayeredImage checks_;
+  LayeredImage half_pixels_;
+  LayeredImage hypotheses_;  // then priors, then checks, each a layer for each view
   Buffer parameters_;
   Buffer transfer_nearest_;
   Buffer transfer_winner_;

@@ -8,6 +8,7 @@
 
 #include "device_fixture.h"
 #include "geometry/camera_parameters.h"
+#include "kernel/kernel_fixture.h"
 #include "matching/backend.h"
 #include "widestereo/image_io.h"
 #include "widestereo/matcher.h"
@@ -50,10 +51,10 @@ void expect_agreement(const ViewResult& expected, const ViewResult& actual, doub
   EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97);
 }
 
-/// Runs only the first `dispatches` of a schedule and returns the hypotheses of every view.
-std::vector<cv::Mat> run_partly(Device& device, const RenderedPair& pair, Schedule schedule,
-                                std::size_t dispatches) {
-  schedule.dispatches.resize(dispatches);
+/// Runs a schedule up to its first dispatch of a kernel; returns the hypotheses of every view.
+std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& pair,
+                               Schedule schedule) {
+  keep_first(schedule, last);
   std::vector<cv::Size> sizes;
   for (const View& view : pair.rig.views) sizes.emplace_back(view.camera.width, view.camera.height);
   const auto backend = device.implementation().make_backend(sizes, schedule.constants);
@@ -85,14 +86,14 @@ TEST_P(Parity, InitialPlanesAndCostsAgree) {
                                      {PatchWarp::affine, Filter::exact},
                                      {PatchWarp::quadratic, Filter::exact},
                                      {PatchWarp::affine, Filter::device}}) {
-    // Texture units round positions to 1/256 pixel.
+    // Texture units round positions to 1/512 pixel.
     const double rounding = filter == Filter::exact ? 1 : 10;
     Options options = small_options(pair);
     options.warp = warp;
     options.filter = filter;
     const Schedule schedule = make_schedule(pair.rig, options);
-    const cv::Mat_<cv::Vec4f> expected = run_partly(cpu, pair, schedule, 1)[0];
-    const cv::Mat_<cv::Vec4f> actual = run_partly(*device, pair, schedule, 1)[0];
+    const cv::Mat_<cv::Vec4f> expected = run_up_to(Kernel::initialise, cpu, pair, schedule)[0];
+    const cv::Mat_<cv::Vec4f> actual = run_up_to(Kernel::initialise, *device, pair, schedule)[0];
     int planes_differ = 0;
     int validity_differs = 0;
     std::vector<float> cost_differences;

@@ -56,6 +56,7 @@ using kernel::uint;
 using vec2 = kernel::Vector2<Number>;
 using vec3 = kernel::Vector3<Number>;
 using vec4 = kernel::Vector4<Number>;
+inline vec2 operator*(float factor, vec2 v) { return Number(factor) * v; }
 using real = Number;
 using real2 = vec2;
 using real3 = vec3;
@@ -90,9 +91,9 @@ inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
 inline Number intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return kernel::cpu::intensity_at(context.plain, view, p);
 }
-inline vec4 intensity_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   counts.texels += 4;
-  return numbers<vec4>(kernel::cpu::intensity_taps(context.plain, view, p));
+  return numbers<vec4>(kernel::cpu::half_pixel_taps(context.plain, view, p));
 }
 inline vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return numbers<vec4>(kernel::cpu::hypothesis_at(context.plain, view, p));

@@ -3,6 +3,7 @@
 // one.
 #pragma once
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
 
 #include "cpu/kernels.h"
@@ -57,6 +58,13 @@ inline cv::Mat smooth_noise(cv::Size size, int seed) {
   return noise;
 }
 
+/// Leaves of a schedule what comes up to its first dispatch of a kernel.
+inline void keep_first(Schedule& schedule, Kernel last) {
+  const auto is_last = [last](const Dispatch& dispatch) { return dispatch.kernel == last; };
+  const auto end = std::ranges::find_if(schedule.dispatches, is_last);
+  schedule.dispatches.erase(std::next(end), schedule.dispatches.end());
+}
+
 class KernelFixture {
  public:
   KernelFixture(Rig rig, const Options& options)
@@ -80,6 +88,8 @@ class KernelFixture {
     nearest_.create(largest);
     winner_.create(largest);
     pass_ = schedule_.dispatches.front().pass;
+    interpolate();
+    pass_.candidates = 0;
   }
 
   kernel::cpu::Context context() {
@@ -89,6 +99,19 @@ class KernelFixture {
   Schedule& schedule() { return schedule_; }
   const Rig& rig() const { return rig_; }
   kernel::cpu::ViewMemory& view(int i) { return views_[i]; }
+
+  /// Makes the images' half pixels, as the schedule begins; after every change of an image.
+  void interpolate() {
+    for (const Dispatch& dispatch : schedule_.dispatches) {
+      const auto view = static_cast<std::size_t>(dispatch.pass.reference);
+      if (dispatch.kernel != Kernel::interpolate || view >= views_.size()) continue;
+      const kernel::cpu::Context context{schedule_.parameters, dispatch.pass, schedule_.constants,
+                                         views_.data(),        nearest_,      winner_};
+      for (int y = 0; y < dispatch.height; ++y) {
+        for (int x = 0; x < dispatch.width; ++x) kernel::cpu::interpolate_pixel(context, {x, y});
+      }
+    }
+  }
 
   /// Makes `view` the reference and every other view a source.
   void set_reference(int view) {

@@ -28,6 +28,7 @@ class Measure : public ::testing::Test {
       grey.copyTo(image, image >= 0);  // masked pixels stay masked
       fixture_.view(i).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
     }
+    fixture_.interpolate();
     fixture_.set_reference(0);
   }
 
@@ -37,6 +38,7 @@ class Measure : public ::testing::Test {
     const cv::Mat masked = image < 0;
     image.convertTo(image, -1, gain, offset);
     image.setTo(MASKED_INTENSITY, masked);
+    fixture_.interpolate();
   }
 
   /// Pixels in the source between where the wall is and where the measure puts it, of a plane held
@@ -92,6 +94,7 @@ TEST_F(Measure, SubpixelMatchNeedsEvidence) {
     cv::Mat image = fixture_.view(i).image();
     image.setTo(0.5, image >= 0);
   }
+  fixture_.interpolate();
   EXPECT_NEAR(root_mean_square(measured(0.3, SUBPIXEL_MATCH)), 0.3, 0.01) << "no texture";
 }
 

@@ -379,6 +379,7 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
     return static_cast<double>(1 / (better.x * ray.x + better.y * ray.y + better.z * ray.z));
   };
   for (int view = 0; view < 2; ++view) fixture.view(view).image().setTo(0.5);
+  fixture.interpolate();
   EXPECT_NEAR(chosen_distance(2, NO_INFORMATION_COST, 90), 90, 0.01) << "nothing to see: far";
   EXPECT_NEAR(chosen_distance(90, NO_INFORMATION_COST, 2), 90, 0.01);
   EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4) << "a difference in cost outweighs it";

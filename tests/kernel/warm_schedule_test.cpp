@@ -32,7 +32,7 @@ TEST(WarmSchedule, RunsOnWhatAColdOneNeeds) {
     const Schedule warm = make_warm_schedule(rig, options);
     EXPECT_EQ(warm.constants, cold.constants);
     EXPECT_EQ(warm.views.size(), cold.views.size());
-    EXPECT_EQ(warm.dispatches.front().kernel, Kernel::transfer_clear);
+    EXPECT_EQ(warm.dispatches.front().kernel, Kernel::interpolate);
     EXPECT_EQ(warm.dispatches.back().kernel, Kernel::check);
     for (const Dispatch& dispatch : warm.dispatches) {
       EXPECT_LT(dispatch.pass.reference, 2) << "no coarser levels";

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: MIT
+#version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "portable.h"
+
+#include "camera.glsl"
+#include "parameters.glsl"
+
+#include "bindings.glsl"
+
+#include "plane.glsl"
+#include "random.glsl"
+#include "patch.glsl"
+#include "search.glsl"
+#include "interpolation.glsl"
+
+void main() {
+  ivec2 pixel;
+  if (thread_pixel(pass.reference, pixel)) interpolate_pixel(pixel);
+}
