@@ -27,7 +27,12 @@ layout(set = 0, binding = 5) uniform sampler2DArray half_pixel_texture;
 layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
 layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
-layout(push_constant) uniform PassBlock { PassParameters pass; };
+layout(push_constant) uniform PassBlock {
+  PassParameters pass;
+#ifdef HAS_BUFFER_ROWS
+  BufferRows rows;
+#endif
+};
 
 vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, ivec3(p, view)); }
 

@@ -9,6 +9,9 @@
 #define APRON 16
 #define MASKED_INTENSITY -1e30f
 
+// Of a pixel without a plane: the largest cost of all.
+#define INVALID_COST 2.0f
+
 // Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl). What a
 // bilinear sample touches up to a pixel outside is masked.
 #define HALF_PIXEL_APRON 2
@@ -54,4 +57,11 @@ struct PassParameters {
   int steps;          // sweep: inverse distances; regression: of its grid of neighbours, in the radius
   float deviation;    // regression: standard deviation (source pixels) that is enough; 0: normals only
   int places;         // check: other places tried for a better match
+};
+
+// Push constants after those, where an application's buffer is read or written (Vulkan).
+struct BufferRows {
+  uint first;  // of row 0: bytes of an image, words of 4 bytes of a map
+  uint pitch;  // from row to row, likewise
+  int kind;    // PIXEL_GREY8 and the like, or MAP_DISTANCE and the like
 };

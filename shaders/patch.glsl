@@ -2,7 +2,6 @@
 // Matching cost of a plane hypothesis: the reference pixel's patch is mapped through the plane into each
 // source image with the source's real camera model and compared by ZNCC.
 
-#define INVALID_COST 2.0f
 #define NO_INFORMATION_COST 1.0f
 
 #define WARP_EXACT 0

@@ -5,19 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace widestereo {
+#include "widestereo/pixel_type.h"
 
-enum class CudaPixel : int {
-  grey8 = 0,      ///< std::uint8_t
-  grey16 = 1,     ///< std::uint16_t, 65535 is white
-  intensity = 2,  ///< float in [0, 1]; other values, NaN included, count as masked
-};
+namespace widestereo {
 
 /// A view's image in device memory, of the calibrated size.
 struct CudaImage {
   const void* data = nullptr;  ///< aligned to a pixel
   std::size_t pitch = 0;       ///< bytes from row to row, a multiple of a pixel's
-  CudaPixel pixel = CudaPixel::grey8;
+  PixelType pixel = PixelType::grey8;
 };
 
 /// A map in device memory, of a view's size; without data it is not written.

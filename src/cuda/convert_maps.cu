@@ -39,14 +39,13 @@ __global__ void import_pixel(CudaImage image, ViewMemory view, int height) {
   int x;
   int y;
   if (!thread_pixel(view.width, height, x, y)) return;
-  float intensity = MASKED_INTENSITY;
-  if (image.pixel == CudaPixel::grey8) {
-    intensity = static_cast<float>(read<std::uint8_t>(image, x, y)) * scale_of_8_bits;
-  } else if (image.pixel == CudaPixel::grey16) {
-    intensity = static_cast<float>(read<std::uint16_t>(image, x, y)) * scale_of_16_bits;
+  float intensity;
+  if (image.pixel == PixelType::grey8) {
+    intensity = static_cast<float>(read<std::uint8_t>(image, x, y)) * SCALE_OF_8_BITS;
+  } else if (image.pixel == PixelType::grey16) {
+    intensity = static_cast<float>(read<std::uint16_t>(image, x, y)) * SCALE_OF_16_BITS;
   } else {
-    const float value = read<float>(image, x, y);
-    if (value >= 0 && value < above_intensity) intensity = value;
+    intensity = intensity_or_masked(read<float>(image, x, y));
   }
   if (view.rays[y * view.width + x].w == 0) intensity = MASKED_INTENSITY;
   view.intensities[y * view.stride + x] = intensity;

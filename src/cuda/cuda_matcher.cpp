@@ -5,6 +5,7 @@
 
 #include "cuda/convert_maps.h"
 #include "cuda/cuda_backend.h"
+#include "matching/device_rows.h"
 #include "matching/match_setup.h"
 #include "widestereo/cuda.h"
 #include "widestereo/error.h"
@@ -12,35 +13,16 @@
 namespace widestereo {
 namespace {
 
-std::size_t bytes_of(CudaPixel pixel) {
-  switch (pixel) {
-    case CudaPixel::grey8:
-      return 1;
-    case CudaPixel::grey16:
-      return 2;
-    case CudaPixel::intensity:
-      return 4;
-  }
-  throw Error("There is no pixel type " + std::to_string(static_cast<int>(pixel)) +
-              "; use one of CudaPixel.");
-}
-
-/// Rows of `width` elements must fit, and every element be aligned.
-void require_rows(const void* data, std::size_t pitch, std::size_t element, std::size_t row,
-                  const std::string& what) {
+void require_data_rows(const void* data, std::size_t pitch, std::size_t element, std::size_t row,
+                       const std::string& what) {
   if (data == nullptr) throw Error(what + " has no data; give a device pointer.");
-  if (pitch < row || pitch % element != 0 ||
-      reinterpret_cast<std::uintptr_t>(data) % element != 0) {
-    throw Error(what + " has a pitch of " + std::to_string(pitch) +
-                " bytes; its pointer and pitch must be multiples of " + std::to_string(element) +
-                " and rows have " + std::to_string(row) + " bytes.");
-  }
+  require_rows({reinterpret_cast<std::uintptr_t>(data), pitch, element, row, "pointer"}, what);
 }
 
 template <class T>
 void require_map(const CudaMap<T>& map, std::size_t values, const std::string& what) {
   if (map.data == nullptr) return;
-  require_rows(map.data, map.pitch, sizeof(T), values * sizeof(T), what);
+  require_data_rows(map.data, map.pitch, sizeof(T), values * sizeof(T), what);
 }
 
 DeviceInfo cuda_device() {
@@ -138,16 +120,13 @@ class CudaMatcher::Implementation {
   void require_fitting(std::span<const CudaImage> images,
                        std::span<const CudaViewMaps> maps) const {
     const std::size_t views = rig_.views.size();
-    if (images.size() != views || maps.size() != views) {
-      throw Error("The rig has " + std::to_string(views) + " views, but " +
-                  std::to_string(images.size()) + " image(s) and maps for " +
-                  std::to_string(maps.size()) + " view(s) were given.");
-    }
+    require_one_for_each_view(views, images.size(), maps.size());
     for (std::size_t i = 0; i < views; ++i) {
       const std::string of_view = " of " + rig_.views[i].name;
       const auto width = static_cast<std::size_t>(rig_.views[i].camera.width);
       const std::size_t pixel = bytes_of(images[i].pixel);
-      require_rows(images[i].data, images[i].pitch, pixel, width * pixel, "The image" + of_view);
+      require_data_rows(images[i].data, images[i].pitch, pixel, width * pixel,
+                        "The image" + of_view);
       require_map(maps[i].distance, width, "The distance map" + of_view);
       require_map(maps[i].normals, 3 * width, "The normal map" + of_view);
       require_map(maps[i].cost, width, "The cost map" + of_view);

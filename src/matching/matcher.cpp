@@ -14,8 +14,6 @@
 namespace widestereo {
 namespace {
 
-using kernel::no_plane_cost;
-
 kernel::vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 
 /// Intensities with every pixel without a usable ray marked as masked.
@@ -49,7 +47,7 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
 
 void require_overlap(const std::vector<ViewResult>& views) {
   for (const ViewResult& view : views) {
-    if (cv::countNonZero(view.cost < no_plane_cost) > 0) return;
+    if (cv::countNonZero(view.cost < INVALID_COST) > 0) return;
   }
   throw Error(
       "The images do not overlap: no pixel of any view is seen by another one within the distance "

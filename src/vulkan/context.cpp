@@ -65,6 +65,10 @@ void VulkanContext::load_functions() {
   functions_ = DeviceFunctions::load(instance_functions_.vkGetDeviceProcAddr, handles_.device);
 }
 
+DeviceInfo VulkanContext::info() const {
+  return describe(instance_functions_, handles_.physical_device, 0);
+}
+
 VkImageFormatProperties VulkanContext::image_limits(VkFormat format,
                                                     VkImageUsageFlags usage) const {
   VkImageFormatProperties limits{};

@@ -6,21 +6,10 @@
 
 #include "vulkan/functions.h"
 #include "vulkan/handle.h"
+#include "widestereo/device.h"
+#include "widestereo/vulkan.h"
 
 namespace widestereo {
-
-/// What an application hands in to have matching done on its own device. The device must be of
-/// Vulkan 1.1 or newer and the queue family must compute; no feature or extension needs to be
-/// enabled. Nothing handed in is ever destroyed. Vulkan requires that nobody else uses `queue`
-/// during a call that submits.
-struct VulkanHandles {
-  PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
-  VkInstance instance = VK_NULL_HANDLE;
-  VkPhysicalDevice physical_device = VK_NULL_HANDLE;
-  VkDevice device = VK_NULL_HANDLE;
-  VkQueue queue = VK_NULL_HANDLE;
-  std::uint32_t queue_family = 0;
-};
 
 /// A device with one compute queue, its own or an application's, and the functions to drive it.
 class VulkanContext {
@@ -40,6 +29,7 @@ class VulkanContext {
   std::uint32_t queue_family() const { return handles_.queue_family; }
   const VkPhysicalDeviceProperties& properties() const { return properties_; }
   std::string name() const { return properties_.deviceName; }
+  DeviceInfo info() const;
   std::uint32_t timestamp_bits() const { return timestamp_bits_; }  ///< 0: cannot measure time
 
   /// Largest extent and layer count of such an image; zeros where it is not supported at all.

@@ -9,23 +9,6 @@
 namespace widestereo {
 namespace {
 
-struct Specialisation {
-  KernelConstants constants;
-  VkBool32 sampled = VK_TRUE;
-};
-
-constexpr std::array<VkSpecializationMapEntry, 9> specialisation_entries = {{
-    {0, offsetof(Specialisation, constants.window_radius), sizeof(int)},
-    {1, offsetof(Specialisation, constants.warp), sizeof(int)},
-    {2, offsetof(Specialisation, constants.camera_model), sizeof(int)},
-    {3, offsetof(Specialisation, constants.view_count), sizeof(int)},
-    {4, offsetof(Specialisation, sampled), sizeof(VkBool32)},
-    {5, offsetof(Specialisation, constants.pattern), sizeof(int)},
-    {6, offsetof(Specialisation, constants.weighted), sizeof(int)},
-    {7, offsetof(Specialisation, constants.filter), sizeof(int)},
-    {8, offsetof(Specialisation, constants.source_count), sizeof(int)},
-}};
-
 Handle<VkShaderModule> make_module(const VulkanContext& context, const std::string& name) {
   const std::span<const std::uint32_t> code = shader_code(name);
   VkShaderModuleCreateInfo info{};
@@ -38,39 +21,75 @@ Handle<VkShaderModule> make_module(const VulkanContext& context, const std::stri
   return context.own(module, context.vk().vkDestroyShaderModule);
 }
 
-Handle<VkPipeline> make_pipeline(const VulkanContext& context, const std::string& name,
-                                 const Specialisation& constants, VkPipelineLayout layout,
-                                 VkPipelineCache cache) {
-  const Handle<VkShaderModule> module = make_module(context, name);
-  const VkSpecializationInfo specialisation = {
-      static_cast<std::uint32_t>(specialisation_entries.size()), specialisation_entries.data(),
-      sizeof constants, &constants};
-  VkComputePipelineCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
-  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
-  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
-  info.stage.module = module.get();
-  info.stage.pName = "main";
-  info.stage.pSpecializationInfo = &specialisation;
-  info.layout = layout;
-  VkPipeline pipeline = VK_NULL_HANDLE;
-  context.check(
-      context.vk().vkCreateComputePipelines(context.device(), cache, 1, &info, nullptr, &pipeline),
-      "compile the kernel " + name);
-  return context.own(pipeline, context.vk().vkDestroyPipeline);
-}
-
 }  // namespace
 
+std::uint32_t workgroups(int pixels) {
+  constexpr int side = 8;  // of shaders/bindings.glsl
+  return static_cast<std::uint32_t>((pixels + side - 1) / side);
+}
+
+Handle<VkDescriptorSetLayout> make_set_layout(
+    const VulkanContext& context, std::span<const VkDescriptorSetLayoutBinding> bindings) {
+  VkDescriptorSetLayoutCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
+  info.bindingCount = static_cast<std::uint32_t>(bindings.size());
+  info.pBindings = bindings.data();
+  VkDescriptorSetLayout layout = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateDescriptorSetLayout(context.device(), &info, nullptr, &layout),
+                "make a descriptor set layout");
+  return context.own(layout, context.vk().vkDestroyDescriptorSetLayout);
+}
+
+Handle<VkPipelineLayout> make_pipeline_layout(const VulkanContext& context,
+                                              std::span<const VkDescriptorSetLayout> sets,
+                                              std::uint32_t push_constant_bytes) {
+  const VkPushConstantRange push_constants = {VK_SHADER_STAGE_COMPUTE_BIT, 0, push_constant_bytes};
+  VkPipelineLayoutCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
+  info.setLayoutCount = static_cast<std::uint32_t>(sets.size());
+  info.pSetLayouts = sets.data();
+  info.pushConstantRangeCount = 1;
+  info.pPushConstantRanges = &push_constants;
+  VkPipelineLayout layout = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreatePipelineLayout(context.device(), &info, nullptr, &layout),
+                "make a pipeline layout");
+  return context.own(layout, context.vk().vkDestroyPipelineLayout);
+}
+
+Handle<VkDescriptorPool> make_descriptor_pool(const VulkanContext& context, std::uint32_t sets,
+                                              std::span<const VkDescriptorPoolSize> sizes) {
+  VkDescriptorPoolCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
+  info.maxSets = sets;
+  info.poolSizeCount = static_cast<std::uint32_t>(sizes.size());
+  info.pPoolSizes = sizes.data();
+  VkDescriptorPool pool = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateDescriptorPool(context.device(), &info, nullptr, &pool),
+                "make a descriptor pool");
+  return context.own(pool, context.vk().vkDestroyDescriptorPool);
+}
+
+VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool,
+                             VkDescriptorSetLayout layout) {
+  VkDescriptorSetAllocateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
+  info.descriptorPool = pool;
+  info.descriptorSetCount = 1;
+  info.pSetLayouts = &layout;
+  VkDescriptorSet set = VK_NULL_HANDLE;
+  context.check(context.vk().vkAllocateDescriptorSets(context.device(), &info, &set),
+                "make a descriptor set");
+  return set;
+}
+
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
-                     VkPipelineCache cache) {
+                     VkPipelineCache cache)
+    : specialisation_{constants, sampled ? VK_TRUE : VK_FALSE} {
   make_layouts(context);
-  const Specialisation specialisation = {constants, sampled ? VK_TRUE : VK_FALSE};
   for (int i = 0; i < kernel_count; ++i) {
     const Kernel kernel = static_cast<Kernel>(i);
     if (kernel == Kernel::iterate_raster) continue;
-    pipelines_[static_cast<std::size_t>(i)] =
-        make_pipeline(context, to_string(kernel), specialisation, layout(), cache);
+    pipelines_[static_cast<std::size_t>(i)] = make(context, to_string(kernel), layout(), cache);
   }
 }
 
@@ -89,28 +108,41 @@ void Pipelines::make_layouts(const VulkanContext& context) {
       binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
   };
-  VkDescriptorSetLayoutCreateInfo set_info{};
-  set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO;
-  set_info.bindingCount = static_cast<std::uint32_t>(bindings.size());
-  set_info.pBindings = bindings.data();
-  VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
-  context.check(
-      context.vk().vkCreateDescriptorSetLayout(context.device(), &set_info, nullptr, &set_layout),
-      "make a descriptor set layout");
-  set_layout_ = context.own(set_layout, context.vk().vkDestroyDescriptorSetLayout);
+  set_layout_ = make_set_layout(context, bindings);
+  const VkDescriptorSetLayout set_layout = set_layout_.get();
+  layout_ = make_pipeline_layout(context, {&set_layout, 1}, sizeof(kernel::PassParameters));
+}
 
-  const VkPushConstantRange push_constants = {VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                                              sizeof(kernel::PassParameters)};
-  VkPipelineLayoutCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO;
-  info.setLayoutCount = 1;
-  info.pSetLayouts = &set_layout;
-  info.pushConstantRangeCount = 1;
-  info.pPushConstantRanges = &push_constants;
-  VkPipelineLayout layout = VK_NULL_HANDLE;
-  context.check(context.vk().vkCreatePipelineLayout(context.device(), &info, nullptr, &layout),
-                "make a pipeline layout");
-  layout_ = context.own(layout, context.vk().vkDestroyPipelineLayout);
+Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::string& name,
+                                   VkPipelineLayout layout, VkPipelineCache cache) const {
+  static constexpr std::array<VkSpecializationMapEntry, 9> entries = {{
+      {0, offsetof(Specialisation, constants.window_radius), sizeof(int)},
+      {1, offsetof(Specialisation, constants.warp), sizeof(int)},
+      {2, offsetof(Specialisation, constants.camera_model), sizeof(int)},
+      {3, offsetof(Specialisation, constants.view_count), sizeof(int)},
+      {4, offsetof(Specialisation, sampled), sizeof(VkBool32)},
+      {5, offsetof(Specialisation, constants.pattern), sizeof(int)},
+      {6, offsetof(Specialisation, constants.weighted), sizeof(int)},
+      {7, offsetof(Specialisation, constants.filter), sizeof(int)},
+      {8, offsetof(Specialisation, constants.source_count), sizeof(int)},
+  }};
+  const Handle<VkShaderModule> module = make_module(context, name);
+  const VkSpecializationInfo specialisation = {static_cast<std::uint32_t>(entries.size()),
+                                               entries.data(), sizeof specialisation_,
+                                               &specialisation_};
+  VkComputePipelineCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
+  info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+  info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+  info.stage.module = module.get();
+  info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &specialisation;
+  info.layout = layout;
+  VkPipeline pipeline = VK_NULL_HANDLE;
+  context.check(
+      context.vk().vkCreateComputePipelines(context.device(), cache, 1, &info, nullptr, &pipeline),
+      "compile the kernel " + name);
+  return context.own(pipeline, context.vk().vkDestroyPipeline);
 }
 
 VkPipeline Pipelines::get(Kernel kernel) const {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <span>
+#include <string>
 
 #include "schedule/schedule.h"
 #include "vulkan/context.h"
@@ -21,6 +23,21 @@ enum Binding : std::uint32_t {
   binding_half_pixels = 8,
 };
 
+/// How many cover so many pixels of a row or a column.
+std::uint32_t workgroups(int pixels);
+
+// All throw Error naming the device and what failed.
+Handle<VkDescriptorSetLayout> make_set_layout(
+    const VulkanContext& context, std::span<const VkDescriptorSetLayoutBinding> bindings);
+Handle<VkPipelineLayout> make_pipeline_layout(const VulkanContext& context,
+                                              std::span<const VkDescriptorSetLayout> sets,
+                                              std::uint32_t push_constant_bytes);
+Handle<VkDescriptorPool> make_descriptor_pool(const VulkanContext& context, std::uint32_t sets,
+                                              std::span<const VkDescriptorPoolSize> sizes);
+/// Belongs to the pool.
+VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool,
+                             VkDescriptorSetLayout layout);
+
 /// One compute pipeline for each kernel (iterate_raster, which is sequential, excepted),
 /// specialised for constants; all share one descriptor set layout.
 class Pipelines {
@@ -33,10 +50,19 @@ class Pipelines {
   VkPipelineLayout layout() const { return layout_.get(); }
   /// Throws Error for iterate_raster.
   VkPipeline get(Kernel kernel) const;
+  /// A further kernel of shaders/NAME.comp with the same constants.
+  Handle<VkPipeline> make(const VulkanContext& context, const std::string& name,
+                          VkPipelineLayout layout, VkPipelineCache cache) const;
 
  private:
+  struct Specialisation {
+    KernelConstants constants;
+    VkBool32 sampled = VK_TRUE;
+  };
+
   void make_layouts(const VulkanContext& context);
 
+  Specialisation specialisation_;
   Handle<VkDescriptorSetLayout> set_layout_;
   Handle<VkPipelineLayout> layout_;
   std::array<Handle<VkPipeline>, kernel_count> pipelines_;

@@ -15,7 +15,6 @@ constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
 constexpr std::size_t max_bands_per_submission = 256;
 constexpr VkPipelineStageFlags compute_and_transfer =
     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
-constexpr std::uint32_t workgroup = 8;  // of shaders/bindings.glsl, both ways
 
 /// About 100 ms of a slow device of each kind.
 long long default_max_samples(VkPhysicalDeviceType type) {
@@ -63,10 +62,6 @@ VkBufferImageCopy whole_layer(int layer, cv::Size size, int apron) {
 VkImageSubresourceRange layers_of(int first, std::size_t count) {
   return {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, static_cast<std::uint32_t>(first),
           static_cast<std::uint32_t>(count)};
-}
-
-std::uint32_t workgroups(int threads) {
-  return (static_cast<std::uint32_t>(threads) + workgroup - 1) / workgroup;
 }
 
 bool filters_intensities(const VulkanContext& context) {
@@ -174,24 +169,8 @@ void VulkanBackend::make_descriptor_set() {
       {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4},
       {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2},
   }};
-  VkDescriptorPoolCreateInfo pool_info{};
-  pool_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
-  pool_info.maxSets = 1;
-  pool_info.poolSizeCount = static_cast<std::uint32_t>(pool_sizes.size());
-  pool_info.pPoolSizes = pool_sizes.data();
-  VkDescriptorPool pool = VK_NULL_HANDLE;
-  context_.check(vk.vkCreateDescriptorPool(context_.device(), &pool_info, nullptr, &pool),
-                 "make a descriptor pool");
-  descriptor_pool_ = context_.own(pool, vk.vkDestroyDescriptorPool);
-
-  const VkDescriptorSetLayout layout = pipelines_.set_layout();
-  VkDescriptorSetAllocateInfo set_info{};
-  set_info.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO;
-  set_info.descriptorPool = pool;
-  set_info.descriptorSetCount = 1;
-  set_info.pSetLayouts = &layout;
-  context_.check(vk.vkAllocateDescriptorSets(context_.device(), &set_info, &descriptor_set_),
-                 "make a descriptor set");
+  descriptor_pool_ = make_descriptor_pool(context_, 1, pool_sizes);
+  descriptor_set_ = allocate_set(context_, descriptor_pool_.get(), pipelines_.set_layout());
 
   std::vector<VkWriteDescriptorSet> writes;
   const auto write = [&](Binding binding, VkDescriptorType type, const VkDescriptorImageInfo* image,
@@ -349,7 +328,13 @@ void VulkanBackend::require_constants(const Schedule& schedule) const {
       "The schedule was made for other kernel constants than this matcher; make a new one.");
 }
 
+void VulkanBackend::record_barrier(VkCommandBuffer commands) const {
+  barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+          VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT);
+}
+
 void VulkanBackend::record_parameters(VkCommandBuffer commands, const Schedule& schedule) const {
+  require_constants(schedule);
   barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
   context_.vk().vkCmdUpdateBuffer(commands, parameters_.handle.get(), 0, sizeof schedule.parameters,
                                   &schedule.parameters);
@@ -359,8 +344,7 @@ void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) cons
   const DeviceFunctions& vk = context_.vk();
   // Bands of one dispatch would need none, but synchronization validation sees whole images only,
   // and draining the device costs nothing beside a band.
-  barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-          VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT);
+  record_barrier(commands);
   vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE,
                        pipelines_.get(band.dispatch->kernel));
   vk.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.layout(), 0, 1,
@@ -376,8 +360,11 @@ void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) cons
 }
 
 void VulkanBackend::record(VkCommandBuffer commands, const Schedule& schedule) const {
-  require_constants(schedule);
   record_parameters(commands, schedule);
+  record_dispatches(commands, schedule);
+}
+
+void VulkanBackend::record_dispatches(VkCommandBuffer commands, const Schedule& schedule) const {
   for (const Band& band : split_into_bands(schedule, max_samples_)) record_band(commands, band);
 }
 

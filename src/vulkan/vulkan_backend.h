@@ -41,6 +41,14 @@ class VulkanBackend final : public Backend {
   /// earlier compute and transfer commands of the queue; a caller that reads the results puts a
   /// barrier after them (from compute shader writes; all images are in VK_IMAGE_LAYOUT_GENERAL).
   void record(VkCommandBuffer commands, const Schedule& schedule) const;
+  /// The two parts of record(), for further kernels between them: these need the parameters.
+  void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
+  void record_dispatches(VkCommandBuffer commands, const Schedule& schedule) const;
+  /// Lets a kernel see what earlier ones wrote.
+  void record_barrier(VkCommandBuffer commands) const;
+  const Pipelines& pipelines() const { return pipelines_; }
+  /// Of Pipelines::set_layout(): all that kernels read and write.
+  VkDescriptorSet descriptor_set() const { return descriptor_set_; }
 
   void set_rays(int view, const cv::Mat& rays) override;
   void set_intensity(int view, const cv::Mat& intensity) override;
@@ -61,7 +69,6 @@ class VulkanBackend final : public Backend {
                   const VkImageSubresourceRange& layers, VkImageLayout from,
                   VkImageLayout to) const;
   void require_constants(const Schedule& schedule) const;
-  void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
   /// `apron`: where the map begins in the image, both ways.

@@ -9,11 +9,10 @@
 
 #include "device_fixture.h"
 #include "matching/backend.h"
+#include "pixel_fixture.h"
 #include "vulkan_fixture.h"
 #include "widestereo/cuda.h"
-#include "widestereo/image_io.h"
 #include "widestereo/matcher.h"
-#include "widestereo/synthesis.h"
 
 #ifdef WIDESTEREO_HAS_CUDA
 #include <cuda_runtime_api.h>
@@ -156,7 +155,7 @@ class Pitched {
   CudaMap<T> map() const {
     return {static_cast<T*>(data_), pitch_};
   }
-  CudaImage image(CudaPixel pixel) const { return {data_, pitch_, pixel}; }
+  CudaImage image(PixelType pixel) const { return {data_, pitch_, pixel}; }
 
  private:
   cv::Size size_;
@@ -187,7 +186,7 @@ struct DeviceMaps {
   Pitched distance, normals, cost, confidence, reasons;
 };
 
-class CudaApplication : public ::testing::TestWithParam<CudaPixel> {};
+class CudaApplication : public ::testing::TestWithParam<PixelType> {};
 
 TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
   OPEN_DEVICE_OR_SKIP(device, "cuda:0");
@@ -196,13 +195,7 @@ TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
   cv::Mat mask(size, CV_8UC1, cv::Scalar(1));
   mask(cv::Rect(20, 30, 15, 10)).setTo(0);
   pair.rig.views[1].mask = mask;
-  std::vector<cv::Mat> images;
-  for (const RenderedView& view : pair.views) {
-    cv::Mat grey = to_intensity(view.image, "test");
-    if (GetParam() == CudaPixel::grey8) grey.convertTo(grey, CV_8U, 255);
-    if (GetParam() == CudaPixel::grey16) grey.convertTo(grey, CV_16U, 65535);
-    images.push_back(grey);
-  }
+  const std::vector<cv::Mat> images = device_images_of(pair, GetParam());
   Pitched left(size, images[0].type());
   Pitched right(size, images[1].type());
   left.upload(images[0]);
@@ -227,14 +220,9 @@ TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
   CUDA_OK(cudaStreamDestroy(stream));
 }
 
-std::string name_of(const ::testing::TestParamInfo<CudaPixel>& test) {
-  constexpr const char* names[] = {"grey8", "grey16", "intensity"};
-  return names[static_cast<int>(test.param)];
-}
-
 INSTANTIATE_TEST_SUITE_P(Pixels, CudaApplication,
-                         ::testing::Values(CudaPixel::grey8, CudaPixel::grey16,
-                                           CudaPixel::intensity),
+                         ::testing::Values(PixelType::grey8, PixelType::grey16,
+                                           PixelType::intensity),
                          name_of);
 
 TEST(CudaApplication, MayCaptureAMatch) {
@@ -250,7 +238,7 @@ TEST(CudaApplication, MayCaptureAMatch) {
   right.upload(images[1]);
   CudaMatcher matcher(pair.rig, options);
   const DeviceMaps maps(size);
-  const CudaImage inputs[] = {left.image(CudaPixel::intensity), right.image(CudaPixel::intensity)};
+  const CudaImage inputs[] = {left.image(PixelType::intensity), right.image(PixelType::intensity)};
   const CudaViewMaps outputs[] = {maps.maps(), {}};
   cudaStream_t stream = nullptr;
   cudaGraph_t graph = nullptr;
@@ -302,7 +290,7 @@ class CudaSequence : public ::testing::Test {
     cudaDeviceSynchronize();
   }
   std::array<CudaImage, 2> images() const {
-    return {left_.image(CudaPixel::intensity), right_.image(CudaPixel::intensity)};
+    return {left_.image(PixelType::intensity), right_.image(PixelType::intensity)};
   }
   std::array<CudaViewMaps, 2> outputs() const { return {maps_.maps(), CudaViewMaps{}}; }
 
@@ -393,7 +381,7 @@ TEST_F(CudaSequence, NeedsAFrameToStartFrom) {
   upload(0);
   matcher.enqueue(images(), outputs(), nullptr);
   EXPECT_THAT(error_of([&] {
-                const CudaImage one[] = {left_.image(CudaPixel::intensity)};
+                const CudaImage one[] = {left_.image(PixelType::intensity)};
                 matcher.enqueue_next(one, outputs(), nullptr);
               }),
               HasSubstr("2 views"));
@@ -404,16 +392,16 @@ TEST(CudaApplication, RefusesWhatDoesNotFit) {
   const RenderedPair pair = render_demo(96);
   CudaMatcher matcher(pair.rig, every_method()[0]);
   const Pitched memory({96, 96}, CV_32FC1);
-  const CudaImage good = memory.image(CudaPixel::intensity);
+  const CudaImage good = memory.image(PixelType::intensity);
   const auto error = [&](CudaImage right, CudaMap<float> distance) {
     const CudaImage images[] = {good, right};
     CudaViewMaps maps[2];
     maps[0].distance = distance;
     return error_of([&] { matcher.enqueue(images, maps, nullptr); });
   };
-  EXPECT_THAT(error({nullptr, good.pitch, CudaPixel::intensity}, {}), HasSubstr("cam1"));
-  EXPECT_THAT(error({good.data, 96, CudaPixel::intensity}, {}), HasSubstr("pitch"));
-  EXPECT_THAT(error({good.data, 385, CudaPixel::intensity}, {}), HasSubstr("multiples of 4"));
+  EXPECT_THAT(error({nullptr, good.pitch, PixelType::intensity}, {}), HasSubstr("cam1"));
+  EXPECT_THAT(error({good.data, 96, PixelType::intensity}, {}), HasSubstr("pitch"));
+  EXPECT_THAT(error({good.data, 385, PixelType::intensity}, {}), HasSubstr("multiples of 4"));
   EXPECT_THAT(error(good, {memory.map<float>().data, 100}), HasSubstr("distance map of cam0"));
   const CudaImage one[] = {good};
   EXPECT_THAT(error_of([&] { matcher.enqueue(one, {}, nullptr); }), HasSubstr("2 views"));

@@ -98,16 +98,15 @@ TEST(CudaMaps, IntensitiesEqualTheMatchersBitByBit) {
   for (int i = 0; i < 256; ++i) grey8.at<uchar>(0, i) = static_cast<uchar>(i);
   const cv::Mat expected8 = to_intensity(grey8, "test");
   for (int i = 0; i < 256; ++i) {
-    EXPECT_EQ(static_cast<float>(i) * kernel::scale_of_8_bits, expected8.at<float>(0, i));
+    EXPECT_EQ(static_cast<float>(i) * SCALE_OF_8_BITS, expected8.at<float>(0, i));
   }
   cv::Mat grey16(256, 256, CV_16UC1);
   for (int i = 0; i < 65536; ++i) grey16.at<ushort>(i / 256, i % 256) = static_cast<ushort>(i);
   const cv::Mat expected16 = to_intensity(grey16, "test");
   for (int i = 0; i < 65536; ++i) {
-    ASSERT_EQ(static_cast<float>(i) * kernel::scale_of_16_bits,
-              expected16.at<float>(i / 256, i % 256));
+    ASSERT_EQ(static_cast<float>(i) * SCALE_OF_16_BITS, expected16.at<float>(i / 256, i % 256));
   }
-  EXPECT_GT(kernel::above_intensity, 1.0f);
+  EXPECT_GT(ABOVE_INTENSITY, 1.0f);
 }
 
 TEST(CudaMaps, DistancesAndNormalsOfPlanes) {
@@ -123,7 +122,7 @@ TEST(CudaMaps, DistancesAndNormalsOfPlanes) {
   EXPECT_NEAR(n.x, normal.x(), 1e-6);
   EXPECT_NEAR(n.y, normal.y(), 1e-6);
   EXPECT_NEAR(n.z, normal.z(), 1e-6);
-  plane.w = kernel::no_plane_cost;
+  plane.w = INVALID_COST;
   EXPECT_EQ(kernel::plane_distance(plane, unit_ray), 0);
   EXPECT_EQ(kernel::plane_distance({0, 0, 0, 0.5f}, unit_ray), 0);
   EXPECT_EQ(kernel::plane_distance({0, 0, -1, 0.5f}, unit_ray), 0);

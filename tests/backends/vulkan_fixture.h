@@ -13,7 +13,9 @@
 
 #include "error_of.h"
 #include "kernel/kernel_fixture.h"
+#include "vulkan/instance.h"
 #include "vulkan/loader.h"
+#include "vulkan/pipeline_cache.h"
 #include "vulkan/vulkan_device.h"
 #include "widestereo/error.h"
 
@@ -82,6 +84,20 @@ inline bool same_bits(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
          std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
+
+/// Parts of an application that has a device of its own.
+struct Application {
+  explicit Application(bool validation = true)
+      : instance(loader.get_instance_proc_addr(), validation),
+        context(loader.get_instance_proc_addr(), instance.handle(),
+                instance.physical_devices().at(0)),
+        cache(context, {}) {}
+
+  VulkanLoader loader;
+  VulkanInstance instance;
+  VulkanContext context;
+  PipelineCache cache;
+};
 
 /// What the faulty loader does wrong; one at a time, reset by its owner.
 struct Faults {

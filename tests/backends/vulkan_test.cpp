@@ -8,7 +8,6 @@
 #include <fstream>
 
 #include "schedule/bands.h"
-#include "vulkan/instance.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"
 
@@ -24,20 +23,6 @@ DeviceRequest validated(long max_samples_per_dispatch = 0) {
   request.max_samples_per_dispatch = max_samples_per_dispatch;
   return request;
 }
-
-/// Parts of an application that has a device of its own.
-struct Application {
-  explicit Application(bool validation = true)
-      : instance(loader.get_instance_proc_addr(), validation),
-        context(loader.get_instance_proc_addr(), instance.handle(),
-                instance.physical_devices().at(0)),
-        cache(context, {}) {}
-
-  VulkanLoader loader;
-  VulkanInstance instance;
-  VulkanContext context;
-  PipelineCache cache;
-};
 
 TEST(VulkanDevices, AreDescribedCompletely) {
   REQUIRE_VULKAN_OR_SKIP();

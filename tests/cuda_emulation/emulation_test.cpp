@@ -44,7 +44,7 @@ class CudaEmulation : public ::testing::Test {
   void match_in_application() {
     std::vector<std::uint8_t> memory(24 * 24, 100);  // outlives what is enqueued
     CudaMatcher matcher(rig_, options_);
-    const CudaImage image{memory.data(), 24, CudaPixel::grey8};
+    const CudaImage image{memory.data(), 24, PixelType::grey8};
     const CudaImage images[] = {image, image};
     const CudaViewMaps maps[2] = {};
     matcher.enqueue(images, maps, nullptr);
@@ -154,7 +154,7 @@ TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
 TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
   std::vector<std::uint8_t> memory(24 * 24, 100);
   CudaMatcher matcher(rig_, options_);
-  const CudaImage image{memory.data(), 24, CudaPixel::grey8};
+  const CudaImage image{memory.data(), 24, PixelType::grey8};
   const CudaImage images[] = {image, image};
   const CudaViewMaps maps[2] = {};
   matcher.enqueue(images, maps, nullptr);

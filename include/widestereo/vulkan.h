@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// Matching inside a Vulkan application: its device, its command buffers, its buffers, no copies
+// through the host.
+//
+//   widestereo::VulkanMatcher matcher(handles, rig, options);               // once
+//   widestereo::VulkanImage images[] = {{left, 0, pitch}, {right, 0, pitch}};
+//   widestereo::VulkanViewMaps maps[2];
+//   maps[0].distance = {distance, 0, 4 * width};          // what is left out is not written
+//   widestereo::VulkanBuffers buffers = matcher.bind(images, maps);         // once for each set of
+//   buffers matcher.record(commands, buffers);                    // per frame, or once for many
+//   submissions matcher.record_next(commands, buffers, {motion});     // or from the planes of the
+//   frame before
+#pragma once
+
+#include <vulkan/vulkan_core.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "widestereo/matcher.h"
+#include "widestereo/options.h"
+#include "widestereo/pixel_type.h"
+#include "widestereo/rig.h"
+
+namespace widestereo {
+
+/// What an application hands in to have matching done on its own device. The device must be of
+/// Vulkan 1.1 or newer and the queue family must compute; no feature or extension needs to be
+/// enabled. Nothing handed in is ever destroyed. Vulkan requires that nobody else uses `queue`
+/// during a call that submits.
+struct VulkanHandles {
+  PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
+  VkInstance instance = VK_NULL_HANDLE;
+  VkPhysicalDevice physical_device = VK_NULL_HANDLE;
+  VkDevice device = VK_NULL_HANDLE;
+  VkQueue queue = VK_NULL_HANDLE;
+  std::uint32_t queue_family = 0;
+};
+
+/// A view's image in a buffer, of the calibrated size. The buffer needs
+/// VK_BUFFER_USAGE_STORAGE_BUFFER_BIT and must reach to a multiple of 4 bytes after the last pixel.
+struct VulkanImage {
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkDeviceSize offset = 0;  ///< of the first pixel, bytes, a multiple of a pixel's
+  VkDeviceSize pitch = 0;   ///< bytes from row to row, likewise
+  PixelType pixel = PixelType::grey8;
+};
+
+/// A map in a buffer (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT), of a view's size; without a buffer it is
+/// not written.
+struct VulkanMap {
+  VkBuffer buffer = VK_NULL_HANDLE;
+  VkDeviceSize offset = 0;  ///< of the first pixel, bytes, a multiple of 4
+  VkDeviceSize pitch = 0;   ///< bytes from row to row, likewise
+};
+
+/// Results for one reference view; the same values as in ViewResult, 4 bytes each.
+struct VulkanViewMaps {
+  VulkanMap distance;    ///< float: metres along the unit ray, 0 = no plane; not filtered
+  VulkanMap normals;     ///< three floats x y z next to each other, 12 bytes a pixel
+  VulkanMap cost;        ///< float: 1 - ZNCC in [0, 2], 2 = no plane
+  VulkanMap confidence;  ///< float in [0, 1]
+  VulkanMap reasons;     ///< std::uint32_t: Reason bits, 0 = accepted
+};
+
+/// Where a matcher reads its images and writes its maps. Must outlive the execution of what was
+/// recorded with it, and not the matcher.
+class VulkanBuffers {
+ public:
+  ~VulkanBuffers();
+  VulkanBuffers(VulkanBuffers&&) noexcept;
+  VulkanBuffers& operator=(VulkanBuffers&&) noexcept;
+
+ private:
+  friend class VulkanMatcher;
+  class Implementation;
+  explicit VulkanBuffers(std::unique_ptr<Implementation> implementation);
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// Matches images of one rig in an application's command buffers. Not thread-safe; frames of one
+/// matcher must follow each other on one queue. Results equal a Matcher's on the same device.
+class VulkanMatcher {
+ public:
+  /// Allocates all memory, compiles the kernels, submits to the queue and waits for it.
+  /// `pipeline_cache`: a file that keeps compiled kernels between runs; empty for none. Throws
+  /// Error when the rig, the options or the device do not do.
+  VulkanMatcher(const VulkanHandles& handles, const Rig& rig, const Options& options,
+                const std::string& pipeline_cache = {});
+  /// What was recorded must have finished.
+  ~VulkanMatcher();
+  VulkanMatcher(VulkanMatcher&&) noexcept;
+  VulkanMatcher& operator=(VulkanMatcher&&) noexcept;
+
+  /// For images and maps, one for each view. Throws Error for those that do not fit.
+  VulkanBuffers bind(std::span<const VulkanImage> images,
+                     std::span<const VulkanViewMaps> maps) const;
+
+  /// Records one match, outside a render pass, into a command buffer for a queue of the handles'
+  /// family: reads the images and writes the maps. Neither submits, waits nor allocates. It waits
+  /// for earlier compute and transfer commands of the queue; whoever reads the maps puts a barrier
+  /// behind it (from VK_ACCESS_SHADER_WRITE_BIT of the compute stage). May be submitted again and
+  /// again. Where nothing overlaps, all costs are 2.
+  void record(VkCommandBuffer commands, const VulkanBuffers& buffers);
+
+  /// The same for the next frame of a sequence, from the planes that whatever ran before leaves on
+  /// the device, as Matcher::match_next() does: a fraction of the work. `start` is fixed when it is
+  /// recorded; its hypotheses must be empty. Throws Error where no match was recorded before.
+  void record_next(VkCommandBuffer commands, const VulkanBuffers& buffers,
+                   const WarmStart& start = {});
+
+  std::size_t device_bytes() const;
+
+ private:
+  friend class VulkanBuffers;
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace widestereo

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// What the maps of a match mean: intensities from pixels, distances and normals from plane hypotheses. Compiled
+// without contraction for the host and CUDA, which then agree bit by bit.
+
+// Pixel types of an application's images, as include/widestereo/pixel_type.h numbers them.
+#define PIXEL_GREY8 0
+#define PIXEL_GREY16 1
+#define PIXEL_INTENSITY 2
+
+// Largest values of 8 and 16 bits become 1.
+#define SCALE_OF_8_BITS (1.0f / 255.0f)
+#define SCALE_OF_16_BITS (1.0f / 65535.0f)
+// Intensities end here: 1, with room for rounding.
+#define ABOVE_INTENSITY (1.0f + 1e-6f)
+
+// Maps of a view.
+#define MAP_DISTANCE 0
+#define MAP_NORMALS 1
+#define MAP_COST 2
+#define MAP_CONFIDENCE 3
+#define MAP_REASONS 4
+
+FN float intensity_or_masked(float value) {
+  return value >= 0.0f && value < ABOVE_INTENSITY ? value : MASKED_INTENSITY;
+}
+
+// Distance along the unit ray of the plane (m, cost) at a pixel, 0 where it holds none.
+FN float plane_distance(vec4 hypothesis, vec4 ray) {
+  float w = hypothesis.x * ray.x + hypothesis.y * ray.y + hypothesis.z * ray.z;
+  if (hypothesis.w >= INVALID_COST || !(w > 0.0f)) return 0.0f;
+  return 1.0f / w;
+}
+
+// Unit normal, facing the camera, of a plane (m, cost) that the pixel holds.
+FN vec3 plane_normal(vec4 hypothesis) {
+  vec3 m = vec3(hypothesis.x, hypothesis.y, hypothesis.z);
+  return (-1.0f / length(m)) * m;
+}

@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: MIT
+// A Vulkan application that matches in its own command buffers must get what a Matcher gets.
+#include <gmock/gmock.h>
+
+#include "pixel_fixture.h"
+#include "vulkan_fixture.h"
+#include "widestereo/matcher.h"
+#include "widestereo/vulkan.h"
+
+namespace widestereo::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr int side = 65;
+constexpr unsigned char untouched = 0xa5;
+
+/// A storage buffer that the application sees, too.
+class SharedBuffer {
+ public:
+  SharedBuffer(const VulkanContext& context, std::size_t bytes) : bytes_(bytes) {
+    const DeviceFunctions& vk = context.vk();
+    VkBufferCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
+    info.size = bytes;
+    info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+    VkBuffer buffer = VK_NULL_HANDLE;
+    context.check(vk.vkCreateBuffer(context.device(), &info, nullptr, &buffer), "make a buffer");
+    buffer_ = context.own(buffer, vk.vkDestroyBuffer);
+    VkMemoryRequirements requirements{};
+    vk.vkGetBufferMemoryRequirements(context.device(), buffer, &requirements);
+    VkMemoryAllocateInfo allocation{};
+    allocation.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
+    allocation.allocationSize = requirements.size;
+    allocation.memoryTypeIndex =
+        context.memory_type(requirements.memoryTypeBits, VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
+                                                             VK_MEMORY_PROPERTY_HOST_COHERENT_BIT);
+    VkDeviceMemory memory = VK_NULL_HANDLE;
+    context.check(vk.vkAllocateMemory(context.device(), &allocation, nullptr, &memory),
+                  "allocate memory");
+    memory_ = context.own(memory, vk.vkFreeMemory);
+    context.check(vk.vkBindBufferMemory(context.device(), buffer, memory, 0), "bind memory");
+    void* mapped = nullptr;
+    context.check(vk.vkMapMemory(context.device(), memory, 0, VK_WHOLE_SIZE, 0, &mapped), "map");
+    mapped_ = static_cast<unsigned char*>(mapped);
+    clear();
+  }
+
+  void clear() { std::memset(mapped_, untouched, bytes_); }
+  VkBuffer get() const { return buffer_.get(); }
+  /// Of an image or a map inside.
+  cv::Mat mat(cv::Size size, int type, std::size_t offset, std::size_t pitch) const {
+    return cv::Mat(size, type, mapped_ + offset, pitch);
+  }
+
+ private:
+  std::size_t bytes_;
+  Handle<VkDeviceMemory> memory_;
+  Handle<VkBuffer> buffer_;
+  unsigned char* mapped_ = nullptr;
+};
+
+/// A command buffer that may be submitted again and again.
+class Commands {
+ public:
+  explicit Commands(const VulkanContext& context) : context_(context) {
+    const DeviceFunctions& vk = context.vk();
+    VkCommandPoolCreateInfo pool_info{};
+    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+    pool_info.queueFamilyIndex = context.queue_family();
+    VkCommandPool pool = VK_NULL_HANDLE;
+    context.check(vk.vkCreateCommandPool(context.device(), &pool_info, nullptr, &pool), "pool");
+    pool_ = context.own(pool, vk.vkDestroyCommandPool);
+    VkCommandBufferAllocateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
+    info.commandPool = pool;
+    info.commandBufferCount = 1;
+    context.check(vk.vkAllocateCommandBuffers(context.device(), &info, &commands_), "commands");
+    VkFenceCreateInfo fence_info{};
+    fence_info.sType = VK_STRUCTURE_TYPE_FENCE_CREATE_INFO;
+    VkFence fence = VK_NULL_HANDLE;
+    context.check(vk.vkCreateFence(context.device(), &fence_info, nullptr, &fence), "fence");
+    fence_ = context.own(fence, vk.vkDestroyFence);
+    VkCommandBufferBeginInfo begin{};
+    begin.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
+    context.check(vk.vkBeginCommandBuffer(commands_, &begin), "begin");
+  }
+
+  VkCommandBuffer get() const { return commands_; }
+
+  /// What reads the maps waits for them: here, the host.
+  void end() {
+    VkMemoryBarrier barrier{};
+    barrier.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
+    barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+    barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
+    context_.vk().vkCmdPipelineBarrier(commands_, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+                                       VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier, 0, nullptr, 0,
+                                       nullptr);
+    context_.check(context_.vk().vkEndCommandBuffer(commands_), "end");
+  }
+
+  void run() {
+    const DeviceFunctions& vk = context_.vk();
+    VkSubmitInfo submit{};
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands_;
+    const VkFence fence = fence_.get();
+    context_.check(vk.vkQueueSubmit(context_.queue(), 1, &submit, fence), "submit");
+    context_.check(vk.vkWaitForFences(context_.device(), 1, &fence, VK_TRUE, UINT64_MAX), "wait");
+    context_.check(vk.vkResetFences(context_.device(), 1, &fence), "reset");
+  }
+
+ private:
+  const VulkanContext& context_;
+  Handle<VkCommandPool> pool_;
+  VkCommandBuffer commands_ = VK_NULL_HANDLE;
+  Handle<VkFence> fence_;
+};
+
+/// Images at odd places of buffers, and all maps of both views in one more.
+class ApplicationBuffers {
+ public:
+  ApplicationBuffers(const VulkanContext& context, PixelType pixel)
+      : left_(context, image_offset + image_pitch * side + 4),
+        right_(context, image_offset + image_pitch * side + 4),
+        maps_(context, 2 * bytes_of_view),
+        pixel_(pixel) {}
+
+  std::array<VulkanImage, 2> images() const { return {image(left_), image(right_)}; }
+
+  std::array<VulkanViewMaps, 2> maps() const {
+    std::array<VulkanViewMaps, 2> both;
+    for (std::size_t view = 0; view < 2; ++view) {
+      const auto map = [&](std::size_t i) {
+        return VulkanMap{maps_.get(), offset_of(view, i), pitch_of(i)};
+      };
+      both[view] = {map(0), map(1), map(2), map(3), map(4)};
+    }
+    return both;
+  }
+
+  void set(const std::vector<cv::Mat>& images) {
+    const auto copy = [](const cv::Mat& from, const SharedBuffer& to) {
+      from.copyTo(to.mat(from.size(), from.type(), image_offset, image_pitch));
+    };
+    copy(images[0], left_);
+    copy(images[1], right_);
+    maps_.clear();
+  }
+
+  void expect_equal(const StereoResult& expected) const {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const ViewResult& view = expected.views[i];
+      EXPECT_TRUE(same_bits(map(i, 0, CV_32FC1), view.distance)) << i;
+      EXPECT_LT(cv::norm(map(i, 1, CV_32FC3), view.normals, cv::NORM_INF), 1e-6) << i;
+      EXPECT_TRUE(same_bits(map(i, 2, CV_32FC1), view.cost)) << i;
+      EXPECT_TRUE(same_bits(map(i, 3, CV_32FC1), view.confidence)) << i;
+      cv::Mat reasons;
+      view.reasons.convertTo(reasons, CV_32S);
+      EXPECT_TRUE(same_bits(map(i, 4, CV_32SC1), reasons)) << i;
+      for (std::size_t k = 0; k < 5; ++k) expect_untouched_between_rows(i, k);
+    }
+  }
+
+ private:
+  static constexpr std::size_t image_offset = 12;
+  static constexpr std::size_t image_pitch = 4 * side + 8;
+  static constexpr std::size_t gap = 8;
+  static constexpr std::size_t bytes_of_view = (7 * 4 * side + 5 * gap) * side + 64;
+
+  static std::size_t row_of(std::size_t map) { return (map == 1 ? 3 : 1) * 4 * side; }
+  static std::size_t pitch_of(std::size_t map) { return row_of(map) + gap; }
+  static std::size_t offset_of(std::size_t view, std::size_t map) {
+    std::size_t offset = view * bytes_of_view + 4;
+    for (std::size_t i = 0; i < map; ++i) offset += pitch_of(i) * side;
+    return offset;
+  }
+
+  VulkanImage image(const SharedBuffer& buffer) const {
+    return {buffer.get(), image_offset, image_pitch, pixel_};
+  }
+  cv::Mat map(std::size_t view, std::size_t i, int type) const {
+    return maps_.mat({side, side}, type, offset_of(view, i), pitch_of(i)).clone();
+  }
+  void expect_untouched_between_rows(std::size_t view, std::size_t i) const {
+    const cv::Mat rest = maps_.mat({static_cast<int>(gap), side}, CV_8UC1,
+                                   offset_of(view, i) + row_of(i), pitch_of(i));
+    EXPECT_EQ(cv::countNonZero(rest != untouched), 0) << view << " " << i;
+  }
+
+  SharedBuffer left_, right_, maps_;
+  PixelType pixel_;
+};
+
+Options small_options(const std::string& preset) {
+  Options options = Options::preset_named(preset);
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  options.first_iterations = 2;
+  options.second_iterations = 1;
+  options.sweep_steps = 12;
+  return options;
+}
+
+class VulkanApplication : public ::testing::TestWithParam<PixelType> {};
+
+TEST_P(VulkanApplication, GetsTheMatchersResultInItsBuffers) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  Device device = Device::open("vulkan:0");
+  const RenderedPair pair = render_demo(side);
+  const std::vector<cv::Mat> images = device_images_of(pair, GetParam());
+  for (const char* preset : {"fast", "paper"}) {
+    const Options options = small_options(preset);
+    VulkanMatcher matcher(application.context.handles(), pair.rig, options);
+    ApplicationBuffers memory(application.context, GetParam());
+    const VulkanBuffers buffers = matcher.bind(memory.images(), memory.maps());
+    Commands commands(application.context);
+    matcher.record(commands.get(), buffers);
+    commands.end();
+    const StereoResult expected = Matcher(device, pair.rig, options).match(images);
+    for (int submission = 0; submission < 2; ++submission) {
+      memory.set(images);
+      commands.run();
+      memory.expect_equal(expected);
+    }
+    EXPECT_EQ(matcher.device_bytes(), expected.device_bytes);
+  }
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Pixels, VulkanApplication,
+                         ::testing::Values(PixelType::grey8, PixelType::grey16,
+                                           PixelType::intensity),
+                         name_of);
+
+TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  const RenderedPair pair = render_demo(side);
+  std::vector<cv::Mat> images = device_images_of(pair, PixelType::intensity);
+  images[0](cv::Rect(20, 20, 20, 20)).setTo(std::numeric_limits<float>::quiet_NaN());
+  VulkanMatcher matcher(application.context.handles(), pair.rig, small_options("fast"));
+  ApplicationBuffers memory(application.context, PixelType::intensity);
+  SharedBuffer distance(application.context, 4 * side * side);
+  std::array<VulkanViewMaps, 2> maps;
+  maps[0].distance = {distance.get(), 0, 4 * side};
+  const VulkanBuffers buffers = matcher.bind(memory.images(), maps);
+  Commands commands(application.context);
+  matcher.record(commands.get(), buffers);
+  commands.end();
+  memory.set(images);
+  commands.run();
+  const cv::Mat found = distance.mat({side, side}, CV_32FC1, 0, 4 * side);
+  EXPECT_EQ(cv::countNonZero(found(cv::Rect(20, 20, 20, 20))), 0);
+  EXPECT_GT(cv::countNonZero(found), side * side / 2);
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  Device device = Device::open("vulkan:0");
+  const auto pose = [](int k) {
+    return Eigen::Isometry3d(Eigen::Translation3d(0.05 * k, -0.01 * k, 0.02 * k));
+  };
+  const Options options = small_options("fast");
+  const Rig rig = render_demo_from(pose(0), side).rig;
+  Matcher expected(device, rig, options);
+  VulkanMatcher matcher(application.context.handles(), rig, options);
+  ApplicationBuffers memory(application.context, PixelType::grey8);
+  const VulkanBuffers buffers = matcher.bind(memory.images(), memory.maps());
+  for (int k = 0; k < 3; ++k) {
+    const std::vector<cv::Mat> images =
+        device_images_of(render_demo_from(pose(k), side), PixelType::grey8);
+    memory.set(images);
+    Commands commands(application.context);
+    if (k == 0) {
+      matcher.record(commands.get(), buffers);
+      commands.end();
+      commands.run();
+      memory.expect_equal(expected.match(images));
+      continue;
+    }
+    const WarmStart start{.now_from_previous = pose(k).inverse() * pose(k - 1), .frame = k};
+    matcher.record_next(commands.get(), buffers, start);
+    commands.end();
+    commands.run();
+    memory.expect_equal(expected.match_next(images, start));
+  }
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+TEST(VulkanApplications, WhatDoesNotFitIsOneSentence) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  const RenderedPair pair = render_demo(side);
+  const Options options = small_options("fast");
+  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
+  ApplicationBuffers memory(application.context, PixelType::grey16);
+  const std::array<VulkanImage, 2> good = memory.images();
+  const auto error = [&](const VulkanImage& left, const VulkanViewMaps& of_left) {
+    const std::array<VulkanImage, 2> images = {left, good[1]};
+    const std::array<VulkanViewMaps, 2> maps = {of_left, VulkanViewMaps{}};
+    return error_of([&] { matcher.bind(images, maps); });
+  };
+  EXPECT_EQ(error(good[0], {}), "");
+  EXPECT_THAT(error_of([&] {
+                matcher.bind({good.data(), 1}, memory.maps());
+              }),
+              HasSubstr("2 views, but 1 image"));
+  EXPECT_THAT(error({}, {}), HasSubstr("The image of cam0 has no buffer"));
+  VulkanImage bad = good[0];
+  bad.pitch = 2 * side - 2;
+  EXPECT_THAT(error(bad, {}), HasSubstr("The image of cam0 has a pitch of 128 bytes"));
+  bad = good[0];
+  bad.offset = 3;
+  EXPECT_THAT(error(bad, {}), HasSubstr("offset and pitch must be multiples of 2"));
+  bad = good[0];
+  bad.pitch = VkDeviceSize{1} << 40;
+  EXPECT_THAT(error(bad, {}), HasSubstr("maxStorageBufferRange"));
+  VulkanViewMaps maps;
+  maps.normals = {good[0].buffer, 0, 4 * side};
+  EXPECT_THAT(error(good[0], maps), HasSubstr("The normal map of cam0"));
+
+  Commands commands(application.context);
+  const VulkanBuffers buffers = matcher.bind(good, memory.maps());
+  EXPECT_THAT(error_of([&] { matcher.record_next(commands.get(), buffers); }),
+              HasSubstr("no planes of a previous frame"));
+  VulkanMatcher other(application.context.handles(), pair.rig, options);
+  EXPECT_THAT(error_of([&] { other.record(commands.get(), buffers); }),
+              HasSubstr("another matcher"));
+  matcher.record(commands.get(), buffers);
+  EXPECT_THAT(
+      error_of([&] { matcher.record_next(commands.get(), buffers, {.hypotheses = {cv::Mat()}}); }),
+      HasSubstr("leave the hypotheses empty"));
+}
+
+}  // namespace
+}  // namespace widestereo::test
