@@ -48,17 +48,20 @@ vec3 half_pixel_position(int view, vec2 texel) {
   return vec3(texel * texel_size, float(view));
 }
 
+float half_pixel_at(int view, ivec2 p) {
+  ivec3 texel = ivec3(p + HALF_PIXEL_APRON, view);
+  if (SAMPLED) return texelFetch(half_pixel_texture, texel, 0).x;
+  return imageLoad(half_pixels, texel).x;
+}
+
 vec4 half_pixel_taps(int view, ivec2 p) {
-  ivec2 texel = p + HALF_PIXEL_APRON;
   if (SAMPLED) {
     // The corner that the four texels share lies half a texel from any rounding trouble.
-    vec4 taps = textureGather(half_pixel_texture, half_pixel_position(view, vec2(texel + 1)));
+    vec4 taps = textureGather(half_pixel_texture, half_pixel_position(view, vec2(p + HALF_PIXEL_APRON + 1)));
     return vec4(taps.w, taps.z, taps.x, taps.y);
   }
-  return vec4(imageLoad(half_pixels, ivec3(texel, view)).x,
-              imageLoad(half_pixels, ivec3(texel + ivec2(1, 0), view)).x,
-              imageLoad(half_pixels, ivec3(texel + ivec2(0, 1), view)).x,
-              imageLoad(half_pixels, ivec3(texel + ivec2(1, 1), view)).x);
+  return vec4(half_pixel_at(view, p), half_pixel_at(view, p + ivec2(1, 0)),
+              half_pixel_at(view, p + ivec2(0, 1)), half_pixel_at(view, p + ivec2(1, 1)));
 }
 
 float filtered_half_pixel(int view, vec2 texel) {

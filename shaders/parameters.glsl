@@ -12,9 +12,8 @@
 // Of a pixel without a plane: the largest cost of all.
 #define INVALID_COST 2.0f
 
-// Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl). What a
-// bilinear sample touches up to a pixel outside is masked.
-#define HALF_PIXEL_APRON 2
+// Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl).
+#define HALF_PIXEL_APRON (2 * APRON)
 
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {

@@ -7,8 +7,8 @@
 // A back end provides, before including the algorithm:
 //   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
 //   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON pixels outside
-//   vec4  half_pixel_taps(view, texel)      intensities at a half pixel (0, 0: pixel 0, 0; 1, 0: half a pixel to its
-//                                           right), its right, lower and lower right neighbour
+//   float half_pixel_at(view, texel)        intensity at a half pixel; 0, 0: pixel 0, 0; 1, 0: half a pixel to its right
+//   vec4  half_pixel_taps(view, texel)      there and at its right, lower and lower right neighbour
 //   float filtered_half_pixel(view, texel)  bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
 //                                           its centre at HALF_PIXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
 //   void  store_half_pixel(view, texel, intensity)

@@ -57,11 +57,11 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
 
 // Change of the reference's intensity at q per pixel of displacement in the source; false where it is not seen.
 FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) slope) {
-  float left = intensity_at(CONTEXT PASS.reference, ivec2(q.x - 1, q.y));
-  float right = intensity_at(CONTEXT PASS.reference, ivec2(q.x + 1, q.y));
-  float up = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y - 1));
-  float down = intensity_at(CONTEXT PASS.reference, ivec2(q.x, q.y + 1));
-  slope = 0.5f * ((right - left) * direction.x + (down - up) * direction.y);
+  float left = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x - 1, 2 * q.y));
+  float right = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x + 1, 2 * q.y));
+  float up = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x, 2 * q.y - 1));
+  float down = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x, 2 * q.y + 1));
+  slope = (right - left) * direction.x + (down - up) * direction.y;
   return min(min(left, right), min(up, down)) >= 0.0f;
 }
 

@@ -88,7 +88,7 @@ struct Options {
   /// A neighbourhood of an eighth, a quarter or half the radius is taken where it determines the
   /// plane to this standard deviation (source pixels, nominal: neighbours count as independent);
   /// > 0. Each further round of a level asks for 0.6 of the one before.
-  double regression_precision = 0.025;
+  double regression_precision = 0.021;
   /// The first regression of a level averages what neighbours' patches match best, to sub-pixel
   /// accuracy by least squares, instead of where the search has left them.
   bool subpixel_match = true;

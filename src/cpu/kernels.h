@@ -14,7 +14,7 @@ namespace widestereo::kernel::cpu {
 struct ViewMemory {
   cv::Mat_<cv::Vec4f> rays;
   cv::Mat_<float> intensities;  ///< surrounded by APRON masked pixels
-  cv::Mat_<float> half_pixels;  ///< by HALF_PIXEL_APRON masked half pixels
+  cv::Mat_<float> half_pixels;  ///< by HALF_PIXEL_APRON masked ones
   cv::Mat_<cv::Vec4f> hypotheses;
   cv::Mat_<cv::Vec4f> checks;
   cv::Mat_<cv::Vec4f> priors;
@@ -56,6 +56,9 @@ inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
 }
 inline float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
   return &context.views[view].half_pixels(p.y + HALF_PIXEL_APRON, p.x + HALF_PIXEL_APRON);
+}
+inline float half_pixel_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return *half_pixel_address(CONTEXT view, p);
 }
 inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   const float* top = half_pixel_address(CONTEXT view, p);

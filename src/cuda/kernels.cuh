@@ -65,6 +65,9 @@ struct Algorithm {
   FN float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
     return context.views[view].half_pixels + (p.y * context.views[view].half_pixel_stride + p.x);
   }
+  FN float half_pixel_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return __ldg(half_pixel_address(CONTEXT view, p));
+  }
   FN vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
     const float* top = half_pixel_address(CONTEXT view, p);
     const float* bottom = top + context.views[view].half_pixel_stride;

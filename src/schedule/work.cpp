@@ -117,7 +117,7 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::search:
       return {seen | plane, half_pixels, half_of_planes};
     case Kernel::measure:
-      return {seen | plane, plane | in_sources, checks};
+      return {seen | half_pixels | plane, plane | in_sources, checks};
     case Kernel::regress:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:

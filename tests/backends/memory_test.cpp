@@ -14,7 +14,7 @@ namespace {
 
 constexpr double bytes_of_pixel = 16 + 16 + 16 + 16;  // ray, plane, checks, prior
 constexpr double bytes_of_intensity = 4;              // of the image and 16 pixels around it,
-                                                      // and of its half pixels and 2 around them
+                                                      // and of its half pixels and 32 around them
 constexpr double bytes_of_transfer = 4 + 4;
 constexpr double side = 128;
 
@@ -46,7 +46,7 @@ TEST_P(Memory, IsWhatIsDocumented) {
     double expected = side * side * (2 * levels_of_view * bytes_of_pixel + of_largest);
     for (int level = 0; level < levels; ++level) {
       const double own = layers_are_equal ? side : side / (1 << level);
-      const double texels = texels_of(own + 2 * 16, line) + texels_of(2 * own + 2 * 2, line);
+      const double texels = texels_of(own + 2 * 16, line) + texels_of(2 * own + 2 * 32, line);
       expected += 2 * texels * bytes_of_intensity;
     }
     const double bytes = bytes_on(*device, preset);
