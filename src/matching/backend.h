@@ -40,9 +40,7 @@ inline cv::Size with_apron(cv::Size size) {
   return {size.width + 2 * APRON, size.height + 2 * APRON};
 }
 /// Likewise of its half pixels.
-inline cv::Size size_of_half_pixels(cv::Size size) {
-  return {2 * (size.width + HALF_PIXEL_APRON), 2 * (size.height + HALF_PIXEL_APRON)};
-}
+inline cv::Size size_of_half_pixels(cv::Size size) { return with_apron(size) * 2; }
 
 /// Memory and kernels for matches of fixed sizes on one device. All maps have their view's size.
 class Backend {
