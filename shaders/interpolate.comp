@@ -9,10 +9,6 @@
 
 #include "bindings.glsl"
 
-#include "plane.glsl"
-#include "random.glsl"
-#include "patch.glsl"
-#include "search.glsl"
 #include "interpolation.glsl"
 
 void main() {

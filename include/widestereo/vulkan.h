@@ -2,14 +2,13 @@
 // Matching inside a Vulkan application: its device, its command buffers, its buffers, no copies
 // through the host.
 //
-//   widestereo::VulkanMatcher matcher(handles, rig, options);               // once
+//   widestereo::VulkanMatcher matcher(handles, rig, options);        // once
 //   widestereo::VulkanImage images[] = {{left, 0, pitch}, {right, 0, pitch}};
 //   widestereo::VulkanViewMaps maps[2];
-//   maps[0].distance = {distance, 0, 4 * width};          // what is left out is not written
-//   widestereo::VulkanBuffers buffers = matcher.bind(images, maps);         // once for each set of
-//   buffers matcher.record(commands, buffers);                    // per frame, or once for many
-//   submissions matcher.record_next(commands, buffers, {motion});     // or from the planes of the
-//   frame before
+//   maps[0].distance = {distance, 0, 4 * width};           // what is left out is not written
+//   widestereo::VulkanBuffers buffers = matcher.bind(images, maps);  // for each set of buffers
+//   matcher.record(commands, buffers);               // per frame, or once for many submissions
+//   matcher.record_next(commands, buffers, {motion});  // or from the planes of the frame before
 #pragma once
 
 #include <vulkan/vulkan_core.h>
@@ -115,7 +114,6 @@ class VulkanMatcher {
   std::size_t device_bytes() const;
 
  private:
-  friend class VulkanBuffers;
   class Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
