@@ -15,6 +15,10 @@
 // Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl).
 #define HALF_PIXEL_APRON (2 * APRON)
 
+// In a vote, the planes that compete with the pixel's own, and the radius of the part of the patch that compares them.
+#define VOTE_RIVALS 2
+#define VOTE_MIDDLE_RADIUS 1
+
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {
   vec4 row0;

@@ -210,9 +210,9 @@ FN float zncc_cost(float n, float sum_a, float sum_b, float sum_aa, float sum_bb
 #define PATTERN_CHECKERBOARD 1
 #define COLUMN_STEP (PATTERN == PATTERN_CHECKERBOARD ? 2 : 1)
 
-// First column of a patch's row: on the checkerboard the centre is a sample.
-FN int first_column(CONTEXT_ARGUMENT int row) {
-  return -WINDOW_RADIUS + (PATTERN == PATTERN_CHECKERBOARD ? (WINDOW_RADIUS + row) & 1 : 0);
+// First column of the row of a patch of this radius: on the checkerboard the centre is a sample.
+FN int first_column(CONTEXT_ARGUMENT int radius, int row) {
+  return -radius + (PATTERN == PATTERN_CHECKERBOARD ? (radius + row) & 1 : 0);
 }
 
 // About exp(a) for a >= 0: the 8th power of 1 + a / 8, with the same bits everywhere (elementary.glsl).
@@ -251,7 +251,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_bb = 0.0f;
   float sum_ab = 0.0f;
   UNROLL_ROWS for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-    int first = first_column(CONTEXT dy);
+    int first = first_column(CONTEXT WINDOW_RADIUS, dy);
     RowMap row;
     if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
     UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {

@@ -83,7 +83,7 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
   float sum_bs = 0.0f;
   float sum_ss = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-    int first = first_column(CONTEXT dy);
+    int first = first_column(CONTEXT WINDOW_RADIUS, dy);
     RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
     for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
@@ -147,7 +147,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float sum = 0.0f;
     float sum_squares = 0.0f;
     for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-      for (int dx = first_column(CONTEXT dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
+      for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         float a = intensity_at(CONTEXT PASS.reference, q);
         float slope;

@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: MIT
 // Vote of the surroundings. Patches match best where they hold the edge of a nearer surface, so that its plane spreads
-// over the weaker texture beside it. Most of the pixels that look alike around there still lie on the right one.
+// over the weaker texture beside it. Most of the pixels that look alike around there still lie on the right one, and
+// the middle of the patch, too small to hold the edge, tells the candidates apart where it has texture of its own.
 
 // Planes that stand for election besides the pixel's own: of pixels in eight directions, at half the radius and at it.
 #define VOTE_CANDIDATES 16
 // Step between the pixels that vote.
 #define VOTE_STEP 3
 // Displacement (source pixels) from which on a plane does not support another.
-#define VOTE_DISPLACEMENT 0.7f
+#define VOTE_DISPLACEMENT 0.4f
 // Planes nearer than this to the pixel's own do not stand, so that curved surfaces stay curved.
-#define SAME_DISPLACEMENT 0.1f
+#define SAME_DISPLACEMENT 0.06f
+// Displacement up to which candidates are the same rival.
+#define RIVAL_DISPLACEMENT 0.35f
+// Largest difference of intensity that counts: where exposures differ by more, all planes are alike.
+#define LARGEST_DIFFERENCE 0.08f
+// Square of the difference that noise alone leaves.
+#define EXPECTED_DIFFERENCE2 1e-4f
 // Random slot; the search and the regression use lower ones.
 #define VOTE_SLOT 72
 
@@ -28,8 +35,36 @@ FN float support_between(float w, float candidate, float scale) {
   return agreement * agreement;
 }
 
-// Stores as prior (m, 1) the plane, of the pixel's own and the candidates, that the planes around support most,
-// weighted by nearness and likeness of intensity; zero where there is none.
+// Inverse of the mean squared difference of intensity over the middle of the patch, noise included. It must not explain
+// a wrong plane by gain and offset, as a correlation of so few pixels could.
+FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
+  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  CameraParameters camera = PARAMETERS.cameras[source];
+  float n = 1.0f;
+  float sum = LARGEST_DIFFERENCE * LARGEST_DIFFERENCE;
+  PatchStart start;
+  if (begin_patch(CONTEXT pair, camera, model_of(CONTEXT camera), source, pixel, m, true, start)) {
+    n = 0.0f;
+    sum = 0.0f;
+    for (int dy = -VOTE_MIDDLE_RADIUS; dy <= VOTE_MIDDLE_RADIUS; ++dy) {
+      int first = first_column(CONTEXT VOTE_MIDDLE_RADIUS, dy);
+      RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
+      for (int dx = 0; dx <= VOTE_MIDDLE_RADIUS - first; dx += COLUMN_STEP) {
+        float a = intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + first + dx, pixel.y + dy));
+        float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
+        if (min(a, b) < 0.0f) continue;
+        float difference = min(abs(a - b), LARGEST_DIFFERENCE);
+        n += 1.0f;
+        sum += difference * difference;
+      }
+    }
+  }
+  return n / (EXPECTED_DIFFERENCE2 * n + sum);
+}
+
+// Stores as prior (m, 1) the plane, of the pixel's own and its rivals, the candidates that the planes around support
+// most, for which support and likeness in the source speak most; zero where there is none. Planes around are weighted by
+// nearness and likeness of intensity.
 FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
@@ -38,7 +73,9 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
     ivec4 size = PARAMETERS.cameras[PASS.reference].size;
     float own = inverse_distance_of(held, ray);
-    float speed = speed_in_sources(CONTEXT ray, own);
+    vec2 velocity;
+    int source = telling_source(CONTEXT ray, own, velocity);
+    float speed = length(velocity);
     float scale = speed / VOTE_DISPLACEMENT;
     float candidates[VOTE_CANDIDATES];
     float support[VOTE_CANDIDATES];
@@ -75,16 +112,29 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       }
     }
     prior = vec4(held.x, held.y, held.z, 1.0f);
-    int elected = -1;
-    UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
-      if (support[i] > most) {
-        most = support[i];
-        elected = i;
+    for (int rival = 0; rival < VOTE_RIVALS; ++rival) {
+      int chosen = -1;
+      float of_chosen = 0.0f;
+      float w = own;
+      UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
+        if (candidates[i] != own && support[i] > of_chosen) {
+          of_chosen = support[i];
+          chosen = i;
+          w = candidates[i];
+        }
       }
-    }
-    if (elected >= 0) {
-      vec4 plane = hypothesis_at(CONTEXT PASS.reference, vote_candidate_at(CONTEXT pixel, elected));
-      prior = vec4(plane.x, plane.y, plane.z, 1.0f);
+      if (chosen < 0) break;
+      UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
+        if (abs(candidates[i] - w) * speed < RIVAL_DISPLACEMENT) support[i] = 0.0f;
+      }
+      if (rival == 0) most *= likeness_of_middle(CONTEXT source, pixel, vec3(held.x, held.y, held.z));
+      vec4 plane = hypothesis_at(CONTEXT PASS.reference, vote_candidate_at(CONTEXT pixel, chosen));
+      vec3 m = vec3(plane.x, plane.y, plane.z);
+      of_chosen *= likeness_of_middle(CONTEXT source, pixel, m);
+      if (of_chosen > most) {
+        most = of_chosen;
+        prior = vec4(m, 1.0f);
+      }
     }
   }
   store_prior(CONTEXT PASS.reference, pixel, prior);

@@ -101,8 +101,8 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--repair-radius", repair_radius,
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
   add("--vote-radius", vote_radius,
-      "Then pixels take the plane that most planes up to this many pixels away agree with; 0 = do "
-      "not");
+      "Then pixels take the plane for which planes up to this many pixels away and the other view's "
+      "intensities speak most; 0 = do not");
   add("--far-preference", far_preference,
       "How much better the nearest planes must match than the farthest, which keeps sky far");
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");

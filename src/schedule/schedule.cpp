@@ -245,15 +245,20 @@ class Builder {
   }
 
   /// The same, `patches` being those in all sources together.
-  void add_with_patches(Kernel kernel, kernel::PassParameters pass, int over, int patches) {
+  void add_with_patches(Kernel kernel, const kernel::PassParameters& pass, int over, int patches) {
+    add_with_samples(
+        kernel, pass, over,
+        patches * samples_of_patch(schedule_.constants.window_radius, schedule_.constants.pattern));
+  }
+
+  /// `samples`: per pixel, in all sources together.
+  void add_with_samples(Kernel kernel, kernel::PassParameters pass, int over, long long samples) {
     const Camera& camera = schedule_.views[over].camera;
     const long long pixels = static_cast<long long>(camera.width) * camera.height;
     pass.first_row = 0;
     pass.last_row = camera.height;
     schedule_.dispatches.push_back(
-        {kernel, pass, camera.width, camera.height,
-         pixels / (pass.colour < 0 ? 1 : 2) * patches *
-             samples_of_patch(schedule_.constants.window_radius, schedule_.constants.pattern)});
+        {kernel, pass, camera.width, camera.height, pixels / (pass.colour < 0 ? 1 : 2) * samples});
   }
 
   void start_at_random(int view) { add(Kernel::initialise, pass_of(view), view, 1); }
@@ -332,7 +337,8 @@ class Builder {
 
   /// `first`: of the level; `last`: of all.
   unsigned cold_candidates(bool coarsest, bool first, bool last) const {
-    unsigned candidates = strips | surroundings;
+    unsigned candidates = strips;
+    if (!last || options_.pattern == PatchPattern::dense) candidates |= surroundings;
     // The last iteration spreads planes alone: the regression does what perturbations would.
     if (!last || options_.level_regressions.back() == 0) {
       candidates |= inverse_distance;
@@ -401,7 +407,10 @@ class Builder {
       kernel::PassParameters pass = pass_of(view);
       pass.iteration = regressions_;
       pass.radius = options_.vote_radius;
-      add(Kernel::vote, pass, view, 0);
+      // Those of the pixel's own plane and of its rivals, in the source that tells most.
+      add_with_samples(
+          Kernel::vote, pass, view,
+          (1 + VOTE_RIVALS) * samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
       add(Kernel::adopt, pass, view, 1);
     }
   }

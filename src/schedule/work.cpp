@@ -128,7 +128,7 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::adopt_fill:
       return {prior | checks | seen, half_pixels, plane | checks};
     case Kernel::vote:
-      return {seen | plane, 0, prior};
+      return {seen | plane, half_pixels, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
     case Kernel::renew:

@@ -2,7 +2,10 @@
 // The vote of the surroundings on maps with two known surfaces.
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "kernel_fixture.h"
+#include "widestereo/synthesis.h"
 
 namespace widestereo::test {
 namespace {
@@ -67,9 +70,9 @@ TEST_F(Vote, LeavesWhatEveryoneAgreesWith) {
   EXPECT_EQ(elected(70), far_plane);
 }
 
-TEST_F(Vote, LeavesWhatDiffersByLessThanATenthOfAPixel) {
+TEST_F(Vote, LeavesWhatDiffersByFewHundredthsOfAPixel) {
   // A point at 2 m moves by about three pixels per unit of inverse distance.
-  constexpr float slightly = far_plane + 0.02f;
+  constexpr float slightly = far_plane + 0.01f;
   constexpr float clearly = far_plane + 0.2f;
   hold(70, 71, slightly);
   EXPECT_EQ(elected(70), slightly);
@@ -94,6 +97,51 @@ TEST_F(Vote, ElectsNoPlaneThatIsOutOfRange) {
 TEST_F(Vote, WorksAtTheImagesEdge) {
   EXPECT_EQ(elected(edge, 0), far_plane);
   EXPECT_EQ(elected(edge, size - 1), far_plane);
+}
+
+/// Share of the pixels that elect a textured wall's plane where most planes around are twice as
+/// near. The source's intensities are brighter by `offset`.
+double share_that_elects_the_wall(float offset) {
+  KernelFixture fixture(fisheye_rig(size), wide_range("fast"));
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+  const RenderedPair pair = render_plane(fixture.rig(), normal, 2);
+  for (int i = 0; i < 2; ++i) {
+    cv::Mat grey;
+    cv::cvtColor(pair.views[i].image, grey, cv::COLOR_BGR2GRAY);
+    grey.convertTo(grey, CV_32FC1, 1.0 / 255, i == 0 ? 0.0f : offset);
+    cv::Mat image = fixture.view(i).image();
+    grey.copyTo(image, image >= 0);
+  }
+  fixture.interpolate();
+  fixture.set_reference(0);
+  fixture.pass().radius = 10;
+  const auto wall = (normal / 2).cast<float>().eval();
+  const auto holds_wall = [](int x) { return x % 7 < 2; };
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const Eigen::Vector3f m = holds_wall(x) ? wall : 2 * wall;
+      fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x(), m.y(), m.z(), 0.2f);
+    }
+  }
+  int pixels = 0;
+  int elected = 0;
+  for (int y = 20; y < size - 20; ++y) {
+    for (int x = 20; x < size - 20; ++x) {
+      if (holds_wall(x)) continue;
+      kernel::cpu::vote_pixel(fixture.context(), ivec2(x, y));
+      ++pixels;
+      if (fixture.view(0).priors(y, x)[2] == wall.z()) ++elected;
+    }
+  }
+  return static_cast<double>(elected) / pixels;
+}
+
+TEST(VoteOnATexturedWall, TheSourceOutweighsTheMajority) {
+  EXPECT_GT(share_that_elects_the_wall(0), 0.8);
+}
+
+TEST(VoteOnATexturedWall, TheMajorityDecidesWhereExposuresDiffer) {
+  EXPECT_LT(share_that_elects_the_wall(0.2f), 0.05);
 }
 
 }  // namespace
