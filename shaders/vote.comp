@@ -15,8 +15,6 @@
 #include "search.glsl"
 #include "pyramid.glsl"
 #include "adaptive_search.glsl"
-#include "consistency.glsl"
-#include "check.glsl"
 #include "vote.glsl"
 
 void main() {

@@ -40,12 +40,10 @@ FN float support_between(float w, float candidate, float scale) {
 FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
   CameraParameters camera = PARAMETERS.cameras[source];
-  float n = 1.0f;
-  float sum = LARGEST_DIFFERENCE * LARGEST_DIFFERENCE;
+  float n = 0.0f;
+  float sum = 0.0f;
   PatchStart start;
   if (begin_patch(CONTEXT pair, camera, model_of(CONTEXT camera), source, pixel, m, true, start)) {
-    n = 0.0f;
-    sum = 0.0f;
     for (int dy = -VOTE_MIDDLE_RADIUS; dy <= VOTE_MIDDLE_RADIUS; ++dy) {
       int first = first_column(CONTEXT VOTE_MIDDLE_RADIUS, dy);
       RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
@@ -59,6 +57,8 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       }
     }
   }
+  // What is not seen is as unlike as can be.
+  if (n == 0.0f) return 1.0f / (EXPECTED_DIFFERENCE2 + LARGEST_DIFFERENCE * LARGEST_DIFFERENCE);
   return n / (EXPECTED_DIFFERENCE2 * n + sum);
 }
 
