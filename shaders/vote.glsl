@@ -127,6 +127,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
         if (abs(candidates[i] - w) * speed < RIVAL_DISPLACEMENT) support[i] = 0.0f;
       }
+      // Where nothing competes, as on most surfaces, nothing needs to be sampled.
       if (rival == 0) most *= likeness_of_middle(CONTEXT source, pixel, vec3(held.x, held.y, held.z));
       vec4 plane = hypothesis_at(CONTEXT PASS.reference, vote_candidate_at(CONTEXT pixel, chosen));
       vec3 m = vec3(plane.x, plane.y, plane.z);

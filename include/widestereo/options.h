@@ -96,7 +96,8 @@ struct Options {
   /// ones up to this many pixels away, 0..10000; 0 = none do.
   int repair_radius = 32;
   /// After that, every pixel takes the plane, of those around, for which the planes up to this many
-  /// pixels away and likeness of intensity in the other view speak most, 0..64; 0 = it keeps its own.
+  /// pixels away and likeness of intensity in the other view speak most, 0..64; 0 = it keeps its
+  /// own.
   int vote_radius = 10;
   /// How much better (cost) the nearest planes must match than the farthest, so that surfaces
   /// without texture and sky come out as far, 0..2.

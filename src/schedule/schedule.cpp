@@ -338,6 +338,7 @@ class Builder {
   /// `first`: of the level; `last`: of all.
   unsigned cold_candidates(bool coarsest, bool first, bool last) const {
     unsigned candidates = strips;
+    // Presets of few samples spend those of the last iteration in the vote instead.
     if (!last || options_.pattern == PatchPattern::dense) candidates |= surroundings;
     // The last iteration spreads planes alone: the regression does what perturbations would.
     if (!last || options_.level_regressions.back() == 0) {
