@@ -112,28 +112,39 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       }
     }
     prior = vec4(held.x, held.y, held.z, 1.0f);
-    for (int rival = 0; rival < VOTE_RIVALS; ++rival) {
+    // The pixel's own plane comes first.
+    ivec2 standing[1 + VOTE_RIVALS];
+    float votes[1 + VOTE_RIVALS];
+    standing[0] = pixel;
+    votes[0] = most;
+    int count = 1;
+    UNROLL for (int rival = 1; rival <= VOTE_RIVALS; ++rival) {
       int chosen = -1;
-      float of_chosen = 0.0f;
       float w = own;
+      votes[rival] = 0.0f;
       UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
-        if (candidates[i] != own && support[i] > of_chosen) {
-          of_chosen = support[i];
+        if (candidates[i] != own && support[i] > votes[rival]) {
+          votes[rival] = support[i];
           chosen = i;
           w = candidates[i];
         }
       }
       if (chosen < 0) break;
+      standing[rival] = vote_candidate_at(CONTEXT pixel, chosen);
+      ++count;
       UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
         if (abs(candidates[i] - w) * speed < RIVAL_DISPLACEMENT) support[i] = 0.0f;
       }
-      // Where nothing competes, as on most surfaces, nothing needs to be sampled.
-      if (rival == 0) most *= likeness_of_middle(CONTEXT source, pixel, vec3(held.x, held.y, held.z));
-      vec4 plane = hypothesis_at(CONTEXT PASS.reference, vote_candidate_at(CONTEXT pixel, chosen));
+    }
+    // Where nothing competes, as on most surfaces, nothing needs to be sampled.
+    if (count == 1) count = 0;
+    float best = 0.0f;
+    for (int k = 0; k < count; ++k) {
+      vec4 plane = hypothesis_at(CONTEXT PASS.reference, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
-      of_chosen *= likeness_of_middle(CONTEXT source, pixel, m);
-      if (of_chosen > most) {
-        most = of_chosen;
+      float score = votes[k] * likeness_of_middle(CONTEXT source, pixel, m);
+      if (score > best) {
+        best = score;
         prior = vec4(m, 1.0f);
       }
     }
