@@ -8,7 +8,7 @@ set(WIDESTEREO_HAS_CUDA FALSE)
 set(cuda_summary "no (WIDESTEREO_CUDA=OFF)")
 if(WIDESTEREO_CUDA)
   if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX})
-    find_program(WIDESTEREO_NVCC nvcc HINTS $ENV{CUDA_PATH}/bin $ENV{CUDA_HOME}/bin PATHS /usr/local/cuda/bin)
+    find_program(WIDESTEREO_NVCC nvcc HINTS ENV CUDA_PATH ENV CUDA_HOME PATH_SUFFIXES bin PATHS /usr/local/cuda)
     mark_as_advanced(WIDESTEREO_NVCC)
     if(WIDESTEREO_NVCC)
       set(ENV{CUDACXX} ${WIDESTEREO_NVCC})  # so that check_language() tries whether it works
