@@ -200,14 +200,15 @@ KernelTable for_model(int camera_model, Get get) {
   }
 }
 
-/// The kernels of the coarse-to-fine search that evaluate patches.
+/// The kernels of the coarse-to-fine search that take most of its time.
 struct PyramidKernels {
   template <class C>
   KernelTable operator()(C) const {
-    static const KernelEntry entries[] = {
-        KERNEL_ENTRY(sweep, C),      KERNEL_ENTRY(upsample, C), KERNEL_ENTRY(search, C),
-        KERNEL_ENTRY(measure, C),    KERNEL_ENTRY(adopt, C),    KERNEL_ENTRY(check, C),
-        KERNEL_ENTRY(adopt_fill, C), KERNEL_ENTRY(vote, C),     KERNEL_ENTRY(renew, C)};
+    static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C),   KERNEL_ENTRY(upsample, C),
+                                          KERNEL_ENTRY(search, C),  KERNEL_ENTRY(measure, C),
+                                          KERNEL_ENTRY(regress, C), KERNEL_ENTRY(adopt, C),
+                                          KERNEL_ENTRY(check, C),   KERNEL_ENTRY(adopt_fill, C),
+                                          KERNEL_ENTRY(vote, C),    KERNEL_ENTRY(renew, C)};
     return table_of(entries);
   }
 };
