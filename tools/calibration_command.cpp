@@ -12,6 +12,7 @@
 #include "widestereo/epipolar.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
+#include "widestereo/rig_refinement.h"
 
 namespace ws = widestereo;
 
@@ -22,6 +23,8 @@ constexpr double degrees = 180 / std::numbers::pi;
 struct CalibrationArguments {
   std::string file, output, format = "kalibr";
   std::string left, right;
+  std::vector<std::string> images;
+  bool intrinsics = false;
   RigSettings rig;
   PoseSettings poses;
   bool as_json = false;
@@ -139,13 +142,16 @@ void show(const CalibrationArguments& arguments) {
   }
 }
 
-void convert(const CalibrationArguments& arguments) {
-  const ws::Rig rig = ws::read_calibration(arguments.file).rig;
+void write(const CalibrationArguments& arguments, const ws::Rig& rig) {
   if (arguments.format == "kalibr") {
     ws::write_kalibr(arguments.output, rig);
   } else {
     ws::write_basalt(arguments.output, rig);
   }
+}
+
+void convert(const CalibrationArguments& arguments) {
+  write(arguments, ws::read_calibration(arguments.file).rig);
   std::cout << "Wrote " << arguments.output << "\n";
 }
 
@@ -186,10 +192,92 @@ void check(const CalibrationArguments& arguments) {
       r.nearest, unit, r.typical, unit, r.farthest, unit, verdict);
 }
 
+/// Matches between all pairs of views, those of all frames together.
+std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig,
+                                          const std::vector<std::string>& files) {
+  const std::size_t count = rig.views.size();
+  std::vector<ws::ViewMatches> pairs;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = i + 1; j < count; ++j) pairs.push_back({i, j, {}});
+  }
+  for (std::size_t frame = 0; frame < files.size(); frame += count) {
+    std::vector<cv::Mat> images;
+    for (std::size_t i = 0; i < count; ++i) {
+      images.push_back(ws::read_image(files[frame + i]));
+      ws::require_calibrated_size(images[i], rig.views[i], files[frame + i]);
+    }
+    for (ws::ViewMatches& pair : pairs) {
+      const auto found = ws::match_features(images[pair.first], images[pair.second]);
+      pair.matches.insert(pair.matches.end(), found.begin(), found.end());
+    }
+  }
+  return pairs;
+}
+
+nlohmann::ordered_json describe(const ws::RefinedValue& value) {
+  return {{"change", value.change}, {"deviation", value.deviation}};
+}
+
+void refine(const CalibrationArguments& arguments) {
+  const ws::Rig rig = arguments.rig.whole_rig(ws::read_image(arguments.images.front()).size());
+  const std::size_t count = rig.views.size();
+  if (count < 2 || arguments.images.size() % count != 0) {
+    throw ws::Error(arguments.rig.calibration + " has " + std::to_string(count) +
+                    " camera(s), but there are " + std::to_string(arguments.images.size()) +
+                    " image(s); give one image of each camera, frame after frame, of two cameras "
+                    "or more.");
+  }
+  const std::vector<ws::ViewMatches> pairs = match_frames(rig, arguments.images);
+  const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);
+  write(arguments, refined.rig);
+  if (arguments.as_json) {
+    nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      json["pairs"].push_back({{"first", rig.views[pairs[i].first].name},
+                               {"second", rig.views[pairs[i].second].name},
+                               {"matches", refined.before[i].matches},
+                               {"median_pixels_before", refined.before[i].median_pixels},
+                               {"median_pixels_after", refined.after[i].median_pixels}});
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const ws::ViewRefinement& view = refined.views[i];
+      json["views"].push_back({{"name", rig.views[i].name},
+                               {"rotation_degrees", describe(view.rotation)},
+                               {"direction_degrees", describe(view.direction)},
+                               {"focal_length_percent", describe(view.focal_length)},
+                               {"principal_point_pixels", describe(view.principal_point)}});
+    }
+    std::cout << json.dump(2) << "\n";
+    return;
+  }
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    std::printf("%s - %s  %d matched features  epipolar error: median %.2f px -> %.2f px\n",
+                rig.views[pairs[i].first].name.c_str(), rig.views[pairs[i].second].name.c_str(),
+                refined.before[i].matches, refined.before[i].median_pixels,
+                refined.after[i].median_pixels);
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const ws::ViewRefinement& view = refined.views[i];
+    if (i > 0) {
+      std::printf(
+          "%s  turned by %.3f (+- %.3f) degrees, its direction from %s by %.2f (+- %.2f) degrees\n",
+          rig.views[i].name.c_str(), view.rotation.change, view.rotation.deviation,
+          rig.views[0].name.c_str(), view.direction.change, view.direction.deviation);
+    }
+    if (arguments.intrinsics) {
+      std::printf("%s  f by %.2f (+- %.2f) %%, c by %.1f (+- %.1f) px\n", rig.views[i].name.c_str(),
+                  view.focal_length.change, view.focal_length.deviation,
+                  view.principal_point.change, view.principal_point.deviation);
+    }
+  }
+  std::cout << "Wrote " << arguments.output << "\n";
+}
+
 }  // namespace
 
 void add_calibration_command(CLI::App& app) {
-  CLI::App* group = app.add_subcommand("calibration", "Show, convert or check calibration files");
+  CLI::App* group =
+      app.add_subcommand("calibration", "Show, convert, check or refine calibration files");
   group->require_subcommand(1);
   auto arguments = std::make_shared<CalibrationArguments>();
 
@@ -203,9 +291,12 @@ void add_calibration_command(CLI::App& app) {
   convert_command->add_option("input", arguments->file, "Kalibr, Basalt or OpenCV file")
       ->required();
   convert_command->add_option("output", arguments->output, "File to write")->required();
-  convert_command->add_option("--to", arguments->format, "kalibr or basalt")
-      ->check(CLI::IsMember({"kalibr", "basalt"}))
-      ->capture_default_str();
+  const auto add_format = [&arguments](CLI::App& command) {
+    command.add_option("--to", arguments->format, "kalibr or basalt")
+        ->check(CLI::IsMember({"kalibr", "basalt"}))
+        ->capture_default_str();
+  };
+  add_format(*convert_command);
   convert_command->callback([arguments] { convert(*arguments); });
 
   CLI::App* check_command = group->add_subcommand(
@@ -215,4 +306,20 @@ void add_calibration_command(CLI::App& app) {
   add_image_options(*check_command, arguments->rig, arguments->poses);
   check_command->add_flag("--json", arguments->as_json, "Print JSON");
   check_command->callback([arguments] { check(*arguments); });
+
+  CLI::App* refine_command = group->add_subcommand(
+      "refine", "Mend how the cameras of a rig stand to each other, from matched features");
+  refine_command
+      ->add_option("images", arguments->images,
+                   "One image of each camera, then those of the next frame, and so on: the more "
+                   "frames, the better")
+      ->required();
+  arguments->rig.add_whole_rig_to(*refine_command);
+  refine_command->add_option("-o,--output", arguments->output, "File to write")->required();
+  add_format(*refine_command);
+  refine_command->add_flag("--intrinsics", arguments->intrinsics,
+                           "Refine focal lengths and principal points, too; needs near and far "
+                           "features all over the images");
+  refine_command->add_flag("--json", arguments->as_json, "Print JSON");
+  refine_command->callback([arguments] { refine(*arguments); });
 }

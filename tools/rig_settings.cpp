@@ -10,17 +10,27 @@
 
 namespace ws = widestereo;
 
-void RigSettings::add_to(CLI::App& command, const std::string& or_other) {
+void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_other) {
   command
       .add_option("-c,--calibration", calibration,
                   "Kalibr camchain, Basalt JSON or OpenCV file" + or_other)
       ->required();
-  command.add_option("--views", views, "Cameras of the calibration, one for each image")
-      ->delimiter(',');
   command.add_option("--mask", masks,
                      "Image, 0 = ignore the pixel; once for all views or once for each");
   command.add_option("--max-theta", max_theta, "Half angle of the lens's field of view, degrees")
       ->check(CLI::Range(1.0, 180.0));
+}
+
+void RigSettings::add_to(CLI::App& command, const std::string& or_other) {
+  add_whole_rig_to(command, or_other);
+  command.add_option("--views", views, "Cameras of the calibration, one for each image")
+      ->delimiter(',');
+}
+
+ws::Rig RigSettings::whole_rig(cv::Size size) const {
+  ws::Rig rig = ws::read_calibration(calibration, size).rig;
+  limit_fields_of_view(rig);
+  return rig;
 }
 
 ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) const {
@@ -61,7 +71,7 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
   if (masks.size() > 1 && masks.size() != rig.views.size()) {
     throw ws::Error("--mask was given " + std::to_string(masks.size()) + " times for " +
                     std::to_string(rig.views.size()) +
-                    " images; give one for all or one for each.");
+                    " views; give one for all or one for each.");
   }
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     ws::View& view = rig.views[i];

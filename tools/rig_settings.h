@@ -16,9 +16,12 @@ struct RigSettings {
   std::vector<std::string> masks;  ///< none, one for all images or one for each
   double max_theta = 0;            ///< degrees, 0 = as calibrated
 
-  /// Adds --calibration, --views, --mask and --max-theta; `or_other`: what else --calibration may
-  /// be.
+  /// Adds --calibration, --mask and --max-theta; `or_other`: what else --calibration may be.
+  void add_whole_rig_to(CLI::App& command, const std::string& or_other = "");
+  /// The same and --views.
   void add_to(CLI::App& command, const std::string& or_other = "");
+  /// All calibrated views, with masks; `size` of the first image.
+  widestereo::Rig whole_rig(cv::Size size) const;
   /// The calibrated views of `image_count` images, in their order, with masks; `size` of the first
   /// image.
   widestereo::Rig rig_for_images(std::size_t image_count, cv::Size size) const;

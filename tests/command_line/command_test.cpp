@@ -286,6 +286,41 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
 }
 
+TEST_F(Command, CalibrationIsRefined) {
+  std::ifstream stream(folder_ / "calib.yaml");
+  std::string text(std::istreambuf_iterator<char>(stream), {});
+  // Turned by two degrees about the baseline.
+  const std::string rows = "[0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]";
+  text.replace(text.find(rows), rows.size(),
+               "[0.0, 0.99939083, -0.03489950, 0.0]\n  - [0.0, 0.03489950, 0.99939083, 0.0]");
+  folder_.write("turned.yaml", text);
+  const std::string pair = file("left.png") + " " + file("right.png") + " ";
+  const std::string refine = "calibration refine " + pair + pair + "-c " + file("turned.yaml");
+  Outcome outcome = run(refine + " --json -o " + file("refined.json") + " --to basalt");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json json = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(json["frames"], 2);
+  EXPECT_GT(json["pairs"][0]["median_pixels_before"].get<double>(), 0.3);
+  EXPECT_LT(json["pairs"][0]["median_pixels_after"].get<double>(), 0.02);
+  EXPECT_NEAR(json["views"][1]["rotation_degrees"]["change"].get<double>(), 2, 0.05);
+  const auto median = [&](const std::string& calibration) {
+    return nlohmann::json::parse(
+               run("calibration check " + pair + "-c " + file(calibration) + " --json").output)
+        .at("median_pixels")
+        .get<double>();
+  };
+  EXPECT_EQ(median("turned.yaml"), json["pairs"][0]["median_pixels_before"]);
+  EXPECT_NEAR(median("refined.json"), json["pairs"][0]["median_pixels_after"].get<double>(), 1e-6);
+  outcome = run(refine + " --intrinsics -o " + file("refined.yaml"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("cam1  f by "), std::string::npos) << outcome.output;
+  expect_error("calibration refine " + pair + file("left.png") + " -o " + file("no.yaml") + " -c " +
+                   file("calib.yaml"),
+               "3 image(s)");
+  expect_error(refine + " -o " + file("no/refined.yaml"), "no/refined.yaml");
+  EXPECT_FALSE(fs::exists(folder_ / "no.yaml"));
+}
+
 TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
   cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
   cv::imwrite(file("near.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
@@ -365,8 +400,9 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
 TEST_F(Command, HelpAndVersion) {
   for (const char* arguments :
        {"--help", "demo --help", "depth --help", "sequence --help", "evaluate --help",
-        "view-synthesis --help", "calibration --help", "calibration show --help", "devices --help",
-        "benchmark --help", "--version", "devices", "devices --json"}) {
+        "view-synthesis --help", "calibration --help", "calibration show --help",
+        "calibration refine --help", "devices --help", "benchmark --help", "--version", "devices",
+        "devices --json"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << outcome.output;
     EXPECT_FALSE(outcome.output.empty());

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "widestereo/epipolar.h"
+#include "widestereo/rig.h"
+
+namespace widestereo {
+
+/// Matches between two views of a rig, of one frame or of many.
+struct ViewMatches {
+  std::size_t first = 0, second = 1;  ///< views of the rig
+  std::vector<PixelMatch> matches;
+};
+
+/// A change, and the standard deviation with which the matches (and the calibration) determine it.
+struct RefinedValue {
+  double change = 0;
+  double deviation = 0;
+};
+
+/// What refining changed of a view, as sizes; of vectors the deviation is that of the least certain
+/// direction.
+struct ViewRefinement {
+  RefinedValue rotation;         ///< degrees; none of view 0
+  RefinedValue direction;        ///< of the view as seen from view 0, degrees
+  RefinedValue focal_length;     ///< percent
+  RefinedValue principal_point;  ///< pixels
+};
+
+struct RigRefinement {
+  Rig rig;
+  std::vector<ViewRefinement> views;
+  std::vector<EpipolarReport> before, after;  ///< of each pair of views
+};
+
+/// The rig that matches fit best, near the calibrated one: for cameras that have moved since they
+/// were calibrated, or were calibrated less well than their images allow. Refined are the rotations
+/// of all views but view 0 and the directions in which view 0 sees them; with `intrinsics` also
+/// focal lengths (both axes alike) and principal points of all views. Lengths of the baselines from
+/// view 0 stay as calibrated: matches tell nothing of scale. What matches do not determine stays
+/// near the calibration, which is taken to be accurate to 0.5 degrees of rotation, 2 degrees of
+/// direction, 1 % of focal length and 3 pixels of principal point.
+/// Minimises Sampson's epipolar error (Hartley, Zisserman, Multiple View Geometry, 2nd ed., section
+/// 11.4.3, with rays in place of homogeneous pixels), robustly, so that false matches do no harm.
+/// Throws Error when a pair names no two views of the rig, has fewer than 8 matches, or when the
+/// matches contradict each other.
+RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs,
+                         bool intrinsics = false);
+
+}  // namespace widestereo

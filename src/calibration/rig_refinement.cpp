@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/rig_refinement.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "statistics/percentile.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+constexpr double degrees = 180 / std::numbers::pi;
+constexpr int most_steps = 50;
+constexpr double last_step = 1e-4;       // of the deviations below
+constexpr double smallest_scale = 0.05;  // pixels: features are not located better
+
+/// Standard deviations of a calibration.
+constexpr double rotation_deviation = 0.5 / degrees;
+constexpr double direction_deviation = 2 / degrees;
+constexpr double focal_deviation = 0.01;
+constexpr double centre_deviation = 3;  // pixels
+
+/// Unknowns of a view: its turn (radians, common frame), the shift of its centre across the line
+/// from view 0's (in units of that distance), the logarithm of its focal lengths, its principal
+/// point.
+constexpr Eigen::Index turn = 0, shift = 3, focal = 5, centre = 6, unknowns_per_view = 8;
+
+using ViewUnknowns = Eigen::Matrix<double, unknowns_per_view, 1>;
+
+/// The epipolar error of a match (pixels) and its derivatives by the unknowns of both views.
+struct Residual {
+  double error;
+  std::array<std::size_t, 2> views;
+  std::array<ViewUnknowns, 2> by;
+};
+
+struct SeenRay {
+  Eigen::Vector3d direction;             ///< common frame, unit length
+  Eigen::Matrix<double, 3, 2> by_pixel;  ///< its derivative
+  Eigen::Vector2d from_centre;           ///< of the pixel from the principal point
+};
+
+bool see(const View& view, const Eigen::Vector2d& pixel, SeenRay& seen) {
+  Eigen::Vector3d ray;
+  Eigen::Vector2d again;
+  Eigen::Matrix<double, 2, 3> pixel_by_ray;
+  if (is_masked(view, pixel) || !unproject(view.camera, pixel, ray) ||
+      !project(view.camera, ray, again, pixel_by_ray)) {
+    return false;
+  }
+  const Eigen::Matrix3d& rotation = view.world_from_camera.linear();
+  seen.direction = rotation * ray;
+  // No pixel moves when a ray is lengthened, so that the pseudo-inverse stays on the unit sphere.
+  seen.by_pixel =
+      rotation * pixel_by_ray.transpose() * (pixel_by_ray * pixel_by_ray.transpose()).inverse();
+  seen.from_centre = pixel - Eigen::Vector2d(view.camera.cx, view.camera.cy);
+  return seen.by_pixel.allFinite();
+}
+
+/// Two unit vectors across a direction and each other.
+Eigen::Matrix<double, 3, 2> across(const Eigen::Vector3d& direction) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = direction.unitOrthogonal();
+  basis.col(1) = direction.normalized().cross(basis.col(0));
+  return basis;
+}
+
+class Refinement {
+ public:
+  Refinement(const Rig& rig, const std::vector<ViewMatches>& pairs, bool intrinsics)
+      : calibrated_(rig), rig_(rig), pairs_(pairs) {
+    ViewUnknowns deviations;
+    deviations << Eigen::Vector3d::Constant(rotation_deviation),
+        Eigen::Vector2d::Constant(direction_deviation), focal_deviation,
+        Eigen::Vector2d::Constant(centre_deviation);
+    deviations_ = deviations.replicate(static_cast<Eigen::Index>(rig.views.size()), 1);
+    refined_ = Eigen::VectorXd::Ones(unknowns());
+    refined_.head<focal>().setZero();  // view 0's pose
+    for (std::size_t view = 0; !intrinsics && view < rig.views.size(); ++view) {
+      refined_.segment<unknowns_per_view - focal>(place(view) + focal).setZero();
+    }
+  }
+
+  const Rig& rig() const { return rig_; }
+
+  /// Gauss and Newton's steps; false when they do not settle.
+  bool solve() {
+    for (int step = 0; step < most_steps; ++step) {
+      linearise();
+      const Eigen::VectorXd update = -information_.ldlt().solve(gradient_);
+      if (!update.allFinite()) return false;
+      for (std::size_t view = 0; view < rig_.views.size(); ++view) {
+        move(view, update.segment<unknowns_per_view>(place(view)));
+      }
+      if (update.cwiseQuotient(deviations_).cwiseAbs().maxCoeff() < last_step) return true;
+    }
+    return false;
+  }
+
+  std::vector<ViewRefinement> report() {
+    linearise();
+    const Eigen::MatrixXd covariance = information_.inverse();
+    std::vector<ViewRefinement> report;
+    for (std::size_t view = 0; view < rig_.views.size(); ++view) {
+      const ViewUnknowns changed = change(view);
+      const auto value = [&](Eigen::Index first, Eigen::Index count, double unit) {
+        const Eigen::Index at = place(view) + first;
+        const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+            covariance.block(at, at, count, count), Eigen::EigenvaluesOnly);
+        return RefinedValue{unit * changed.segment(first, count).norm(),
+                            unit * refined_(at) * std::sqrt(solver.eigenvalues().maxCoeff())};
+      };
+      report.push_back({value(turn, 3, degrees), value(shift, 2, degrees), value(focal, 1, 100),
+                        value(centre, 2, 1)});
+    }
+    return report;
+  }
+
+ private:
+  Eigen::Index unknowns() const { return place(rig_.views.size()); }
+  static Eigen::Index place(std::size_t view) {
+    return static_cast<Eigen::Index>(view) * unknowns_per_view;
+  }
+
+  /// From view 0's centre to the view's; of view 0, which has none, any.
+  static Eigen::Vector3d arm(const Rig& rig, std::size_t view) {
+    if (view == 0) return Eigen::Vector3d::UnitX();
+    return rig.views[view].world_from_camera.translation() -
+           rig.views[0].world_from_camera.translation();
+  }
+
+  /// How far the unknowns of a view are from the calibration.
+  ViewUnknowns change(std::size_t index) const {
+    const View& now = rig_.views[index];
+    const View& before = calibrated_.views[index];
+    const Eigen::AngleAxisd turned(now.world_from_camera.linear() *
+                                   before.world_from_camera.linear().transpose());
+    ViewUnknowns change;
+    change << turned.angle() * turned.axis(),
+        across(arm(rig_, index)).transpose() *
+            (arm(rig_, index).normalized() - arm(calibrated_, index).normalized()),
+        std::log(now.camera.fx / before.camera.fx), now.camera.cx - before.camera.cx,
+        now.camera.cy - before.camera.cy;
+    return change;
+  }
+
+  void move(std::size_t index, const ViewUnknowns& update) {
+    View& view = rig_.views[index];
+    if (index > 0) {
+      Eigen::Isometry3d& pose = view.world_from_camera;
+      const Eigen::Vector3d turned = update.segment<3>(turn);
+      pose.linear() = Eigen::AngleAxisd(turned.norm(), turned.stableNormalized()) * pose.linear();
+      const Eigen::Vector3d before = arm(rig_, index);
+      const Eigen::Vector3d direction =
+          before.normalized() + across(before) * update.segment<2>(shift);
+      pose.translation() =
+          rig_.views[0].world_from_camera.translation() + before.norm() * direction.normalized();
+    }
+    const double scale = std::exp(update(focal));
+    view.camera.fx *= scale;
+    view.camera.fy *= scale;
+    view.camera.skew *= scale;
+    view.camera.cx += update(centre);
+    view.camera.cy += update(centre + 1);
+  }
+
+  std::vector<Residual> residuals() const {
+    std::vector<Residual> residuals;
+    for (const ViewMatches& pair : pairs_) {
+      for (const PixelMatch& match : pair.matches) {
+        Residual residual;
+        if (linearise(pair, match, residual)) residuals.push_back(residual);
+      }
+    }
+    return residuals;
+  }
+
+  /// The volume that both rays and the baseline span is 0 where they lie in a plane.
+  bool linearise(const ViewMatches& pair, const PixelMatch& match, Residual& residual) const {
+    const View& first = rig_.views[pair.first];
+    const View& second = rig_.views[pair.second];
+    SeenRay a;
+    SeenRay b;
+    if (!see(first, match.first, a) || !see(second, match.second, b)) return false;
+    const Eigen::Vector3d between =
+        second.world_from_camera.translation() - first.world_from_camera.translation();
+    const Eigen::Vector3d baseline = between.normalized();
+    const Eigen::Vector3d normal = a.direction.cross(b.direction);
+    const Eigen::Vector3d by_a = b.direction.cross(baseline);
+    const Eigen::Vector3d by_b = baseline.cross(a.direction);
+    const Eigen::Vector3d by_second_centre =
+        (normal - normal.dot(baseline) * baseline) / between.norm();
+    const Eigen::Vector2d by_first_pixel = a.by_pixel.transpose() * by_a;
+    const Eigen::Vector2d by_second_pixel = b.by_pixel.transpose() * by_b;
+    const double slope = std::sqrt(by_first_pixel.squaredNorm() + by_second_pixel.squaredNorm());
+    if (!(slope > 1e-9)) return false;  // at both epipoles every plane holds both rays
+    const auto by_unknowns = [&](std::size_t view, const SeenRay& ray,
+                                 const Eigen::Vector3d& by_ray, const Eigen::Vector2d& by_pixel,
+                                 const Eigen::Vector3d& by_centre) {
+      const Eigen::Vector3d from_view_0 = arm(rig_, view);
+      ViewUnknowns by;
+      // A pixel stays where it is: the larger its image, the nearer to the axis its ray.
+      by << ray.direction.cross(by_ray),
+          from_view_0.norm() * across(from_view_0).transpose() * by_centre,
+          -by_pixel.dot(ray.from_centre), -by_pixel;
+      return ViewUnknowns(by.cwiseProduct(refined_.segment<unknowns_per_view>(place(view))) /
+                          slope);
+    };
+    residual.error = baseline.dot(normal) / slope;
+    residual.views = {pair.first, pair.second};
+    residual.by = {by_unknowns(pair.first, a, by_a, by_first_pixel, -by_second_centre),
+                   by_unknowns(pair.second, b, by_b, by_second_pixel, by_second_centre)};
+    return true;
+  }
+
+  void linearise() {
+    const std::vector<Residual> all = residuals();
+    std::vector<double> sizes;
+    for (const Residual& residual : all) sizes.push_back(std::abs(residual.error));
+    const double scale = std::max(1.4826 * percentile(sizes, 0.5), smallest_scale);
+    const Eigen::VectorXd precision = deviations_.cwiseAbs2().cwiseInverse();
+    information_ = precision.asDiagonal();
+    gradient_.resize(unknowns());
+    for (std::size_t view = 0; view < rig_.views.size(); ++view) {
+      gradient_.segment<unknowns_per_view>(place(view)) = change(view);
+    }
+    gradient_ = gradient_.cwiseProduct(precision);
+    for (const Residual& residual : all) {
+      // Geman and McClure's weight: false matches count for little.
+      const double doubt = 1 + residual.error * residual.error / (4 * scale * scale);
+      const double weight = 1 / (doubt * doubt * scale * scale);
+      for (const int i : {0, 1}) {
+        const Eigen::Index row = place(residual.views[i]);
+        gradient_.segment<unknowns_per_view>(row) += weight * residual.error * residual.by[i];
+        for (const int j : {0, 1}) {
+          information_.block<unknowns_per_view, unknowns_per_view>(row, place(residual.views[j])) +=
+              weight * residual.by[i] * residual.by[j].transpose();
+        }
+      }
+    }
+  }
+
+  const Rig& calibrated_;
+  Rig rig_;
+  const std::vector<ViewMatches>& pairs_;
+  Eigen::VectorXd deviations_;   ///< of the calibration
+  Eigen::VectorXd refined_;      ///< 1: the unknown is refined; 0: it stays
+  Eigen::MatrixXd information_;  ///< inverse covariance
+  Eigen::VectorXd gradient_;
+};
+
+std::vector<EpipolarReport> check(const Rig& rig, const std::vector<ViewMatches>& pairs) {
+  std::vector<EpipolarReport> reports;
+  for (const ViewMatches& pair : pairs) {
+    reports.push_back(check_epipolar(rig.views[pair.first], rig.views[pair.second], pair.matches));
+  }
+  return reports;
+}
+
+}  // namespace
+
+RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, bool intrinsics) {
+  if (pairs.empty()) throw Error("A rig cannot be refined without matches between its views.");
+  for (const ViewMatches& pair : pairs) {
+    if (pair.first < rig.views.size() && pair.second < rig.views.size() &&
+        pair.first != pair.second) {
+      continue;
+    }
+    throw Error("Matches between views " + std::to_string(pair.first) + " and " +
+                std::to_string(pair.second) + " cannot refine a rig of " +
+                std::to_string(rig.views.size()) + " views; name two of them, counted from 0.");
+  }
+  RigRefinement result;
+  result.before = check(rig, pairs);
+  Refinement refinement(rig, pairs, intrinsics);
+  if (!refinement.solve()) {
+    throw Error(
+        "The matched features contradict each other, so that the rig cannot be refined; check that "
+        "the images are those of the calibration's cameras, in its order.");
+  }
+  result.rig = refinement.rig();
+  result.views = refinement.report();
+  result.after = check(result.rig, pairs);
+  return result;
+}
+
+}  // namespace widestereo

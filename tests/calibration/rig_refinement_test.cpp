@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/rig_refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "data_folder.h"
+#include "error_of.h"
+#include "geometry/angle.h"
+#include "widestereo/calibration.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+constexpr double radians = std::numbers::pi / 180;
+
+Eigen::AngleAxisd turned(double degrees, const Eigen::Vector3d& axis) {
+  return Eigen::AngleAxisd(degrees * radians, axis.normalized());
+}
+
+/// Three views of two models, somewhere in the common frame.
+Rig true_rig() {
+  Camera fisheye;
+  fisheye.model = CameraModel::double_sphere;
+  fisheye.width = fisheye.height = 512;
+  fisheye.fx = fisheye.fy = 158;
+  fisheye.cx = 255;
+  fisheye.cy = 257;
+  fisheye.xi = -0.17;
+  fisheye.alpha = 0.59;
+  Camera equidistant = fisheye;
+  equidistant.model = CameraModel::kannala_brandt;
+  equidistant.max_theta = 95 * radians;
+  equidistant.k1 = 0.01;
+  equidistant.k2 = -0.002;
+  const Eigen::Isometry3d base = Eigen::Translation3d(3, -2, 1) * turned(70, {1, 2, 3});
+  Rig rig;
+  rig.views = {{"cam0", fisheye, base, {}},
+               {"cam1", equidistant, base * Eigen::Translation3d(0.1, 0.004, -0.01), {}},
+               {"cam2", fisheye, base * Eigen::Translation3d(-0.03, 0.2, 0.02), {}}};
+  rig.views[1].world_from_camera.rotate(turned(4, {1, -1, 2}));
+  rig.views[2].world_from_camera.rotate(turned(9, {-1, 3, 1}));
+  return rig;
+}
+
+/// `rig` with views 1 and 2 turned by `degrees` and seen by view 0 that far away from where they
+/// are.
+Rig displaced(Rig rig, double degrees) {
+  const Eigen::Vector3d origin = rig.views[0].world_from_camera.translation();
+  for (const std::size_t i : {1, 2}) {
+    Eigen::Isometry3d& pose = rig.views[i].world_from_camera;
+    const Eigen::Vector3d arm = pose.translation() - origin;
+    pose.linear() = turned(degrees, {2, i == 1 ? 1.0 : -1.0, 1}) * pose.linear();
+    pose.translation() = origin + turned(degrees, arm.unitOrthogonal()) * arm;
+  }
+  return rig;
+}
+
+struct Scene {
+  double nearest = 0.4, farthest = 6;  ///< metres
+  double noise = 0;                    ///< pixels, standard deviation
+  double false_matches = 0;            ///< share
+  unsigned seed = 1;
+};
+
+std::vector<ViewMatches> matches_of(const Rig& rig, const Scene& scene, int count = 400) {
+  std::mt19937 random(scene.seed);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::normal_distribution<double> noise(0, 1);
+  std::uniform_real_distribution<double> inverse(1 / scene.farthest, 1 / scene.nearest);
+  std::vector<ViewMatches> pairs = {{0, 1, {}}, {0, 2, {}}, {2, 1, {}}};
+  for (ViewMatches& pair : pairs) {
+    const View& first = rig.views[pair.first];
+    const View& second = rig.views[pair.second];
+    while (static_cast<int>(pair.matches.size()) < count) {
+      const Eigen::Vector3d ray =
+          Eigen::Vector3d(unit(random), unit(random), unit(random) + 0.7).normalized();
+      const Eigen::Vector3d point = ray / inverse(random);
+      const Eigen::Vector3d seen = source_from_reference(second, first) * point;
+      PixelMatch match;
+      if (!project(first.camera, point, match.first) || !project(second.camera, seen, match.second))
+        continue;
+      for (double* at : {&match.first.x(), &match.first.y(), &match.second.x(), &match.second.y()})
+        *at += scene.noise * noise(random);
+      if (unit(random) < 2 * scene.false_matches - 1)
+        match.second += Eigen::Vector2d(60 * unit(random), 60 * unit(random));
+      pair.matches.push_back(match);
+    }
+  }
+  return pairs;
+}
+
+double rotation_error(const Rig& a, const Rig& b, std::size_t view) {
+  return Eigen::AngleAxisd(a.views[view].world_from_camera.linear() *
+                           b.views[view].world_from_camera.linear().transpose())
+             .angle() /
+         radians;
+}
+
+Eigen::Vector3d arm(const Rig& rig, std::size_t view) {
+  return rig.views[view].world_from_camera.translation() -
+         rig.views[0].world_from_camera.translation();
+}
+
+TEST(RigRefinement, FindsTheTruePosesFromExactMatches) {
+  const Rig truth = true_rig();
+  const Rig calibrated = displaced(truth, 0.4);
+  const RigRefinement refined = refine_rig(calibrated, matches_of(truth, {}));
+  for (const std::size_t view : {1, 2}) {
+    // Nearly: the calibration counts a little, too.
+    EXPECT_LT(rotation_error(refined.rig, truth, view), 2e-4);
+    EXPECT_LT(degrees_between(arm(refined.rig, view), arm(truth, view)), 2e-3);
+    EXPECT_NEAR(arm(refined.rig, view).norm(), arm(truth, view).norm(), 1e-12);
+    EXPECT_NEAR(refined.views[view].rotation.change, 0.4, 1e-3);
+    EXPECT_NEAR(refined.views[view].direction.change, 0.4, 1e-2);
+    EXPECT_EQ(refined.rig.views[view].camera.fx, calibrated.views[view].camera.fx);
+    EXPECT_EQ(refined.views[view].focal_length.change, 0);
+    EXPECT_EQ(refined.views[view].focal_length.deviation, 0);
+  }
+  EXPECT_TRUE(refined.rig.views[0].world_from_camera.isApprox(truth.views[0].world_from_camera));
+  EXPECT_EQ(refined.views[0].rotation.deviation, 0);
+  ASSERT_EQ(refined.after.size(), 3u);
+  for (std::size_t pair = 0; pair < 3; ++pair) {
+    EXPECT_GT(refined.before[pair].median_pixels, 0.3);
+    EXPECT_LT(refined.after[pair].median_pixels, 2e-3);
+  }
+}
+
+TEST(RigRefinement, FindsIntrinsicsWhereAsked) {
+  const Rig truth = true_rig();
+  Rig calibrated = displaced(truth, 0.2);
+  for (View& view : calibrated.views) {
+    view.camera.fx *= 1.005;
+    view.camera.fy *= 1.005;
+    view.camera.cx += 1.2;
+    view.camera.cy -= 0.8;
+  }
+  const std::vector<ViewMatches> matches = matches_of(truth, {}, 1000);
+  const RigRefinement refined = refine_rig(calibrated, matches, true);
+  for (std::size_t view = 0; view < 3; ++view) {
+    const Camera& camera = refined.rig.views[view].camera;
+    EXPECT_NEAR(camera.fx / truth.views[view].camera.fx, 1, 2e-4);
+    EXPECT_NEAR(camera.fy / truth.views[view].camera.fy, 1, 2e-4);
+    EXPECT_NEAR(camera.cx, truth.views[view].camera.cx, 0.05);
+    EXPECT_NEAR(camera.cy, truth.views[view].camera.cy, 0.05);
+    EXPECT_NEAR(refined.views[view].focal_length.change, 0.5, 0.02);
+    EXPECT_LT(rotation_error(refined.rig, truth, view), 0.02);
+  }
+  EXPECT_LT(refined.after[0].median_pixels,
+            0.25 * refine_rig(calibrated, matches).after[0].median_pixels);
+}
+
+TEST(RigRefinement, DeviationsSayHowFarFromTheTruthItIs) {
+  const Rig truth = true_rig();
+  const Rig calibrated = displaced(truth, 0.2);
+  constexpr int seeds = 40;
+  double rotation = 0;
+  double direction = 0;
+  for (unsigned seed = 0; seed < seeds; ++seed) {
+    const RigRefinement refined =
+        refine_rig(calibrated, matches_of(truth, {.noise = 0.3, .seed = seed}, 200));
+    const ViewRefinement& view = refined.views[1];
+    rotation += std::pow(rotation_error(refined.rig, truth, 1) / view.rotation.deviation, 2);
+    direction +=
+        std::pow(degrees_between(arm(refined.rig, 1), arm(truth, 1)) / view.direction.deviation, 2);
+  }
+  // Of the least certain direction; the others add to the error.
+  EXPECT_GT(std::sqrt(rotation / seeds), 0.7);
+  EXPECT_LT(std::sqrt(rotation / seeds), 1.7);
+  EXPECT_GT(std::sqrt(direction / seeds), 0.7);
+  EXPECT_LT(std::sqrt(direction / seeds), 1.5);
+}
+
+TEST(RigRefinement, FalseMatchesDoNoHarm) {
+  const Rig truth = true_rig();
+  const RigRefinement refined =
+      refine_rig(displaced(truth, 0.4), matches_of(truth, {.noise = 0.2, .false_matches = 0.25}));
+  for (const std::size_t view : {1, 2}) {
+    EXPECT_LT(rotation_error(refined.rig, truth, view), 0.02);
+    EXPECT_LT(degrees_between(arm(refined.rig, view), arm(truth, view)), 0.2);
+  }
+}
+
+TEST(RigRefinement, WhatMatchesDoNotTellStaysNearTheCalibration) {
+  // Points at infinity tell rotations alone; their noise is taken for a little parallax.
+  const Rig truth = true_rig();
+  const Rig calibrated = displaced(truth, 0.4);
+  const RigRefinement refined =
+      refine_rig(calibrated, matches_of(truth, {.nearest = 1e6, .farthest = 1e8, .noise = 0.1}));
+  for (const std::size_t view : {1, 2}) {
+    EXPECT_LT(rotation_error(refined.rig, truth, view), 0.02);
+    EXPECT_LT(degrees_between(arm(refined.rig, view), arm(calibrated, view)), 2);
+    EXPECT_GT(refined.views[view].direction.deviation, 1);
+  }
+}
+
+TEST(RigRefinement, LeavesOutWhatIsMasked) {
+  const Rig truth = true_rig();
+  Rig calibrated = displaced(truth, 0.4);
+  cv::Mat mask(512, 512, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 200).setTo(0);
+  calibrated.views[1].mask = mask;
+  std::vector<ViewMatches> matches = matches_of(truth, {});
+  for (ViewMatches& pair : matches) {
+    for (PixelMatch& match : pair.matches) {
+      if (pair.second == 1 && match.second.x() < 199) match.first.y() += 3;
+    }
+  }
+  const RigRefinement refined = refine_rig(calibrated, matches);
+  EXPECT_LT(rotation_error(refined.rig, truth, 1), 2e-4);
+}
+
+TEST(RigRefinement, BadInputHasOneSentence) {
+  const Rig rig = true_rig();
+  std::vector<ViewMatches> matches = matches_of(rig, {});
+  matches[1].second = 3;
+  EXPECT_NE(test::error_of([&] { refine_rig(rig, matches); }).find("views 0 and 3"),
+            std::string::npos);
+  matches[1].second = 0;
+  EXPECT_NE(test::error_of([&] { refine_rig(rig, matches); }).find("views 0 and 0"),
+            std::string::npos);
+  matches.resize(1);
+  matches[0].matches.resize(7);
+  EXPECT_NE(test::error_of([&] { refine_rig(rig, matches); }).find("Only 7 features"),
+            std::string::npos);
+  EXPECT_THROW(refine_rig(rig, {}), Error);
+}
+
+TEST(RigRefinement, ARealRigGetsBetter) {
+  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  const auto set = test::data_folder() / "real/vfs_t265_fs";
+  const Rig rig = read_calibration(set / "calib.yaml").rig;
+  const RigRefinement refined = refine_rig(
+      rig, {{0, 1, match_features(read_image(set / "cam0.png"), read_image(set / "cam1.png"))}});
+  EXPECT_LT(refined.after[0].median_pixels, 0.8 * refined.before[0].median_pixels);
+  EXPECT_LT(refined.views[1].rotation.change, 0.2);
+}
+
+}  // namespace
+}  // namespace widestereo
