@@ -74,8 +74,9 @@ void run_depth(const DepthArguments& arguments) {
   const std::vector<std::string> files = files_of(arguments);
   std::vector<cv::Mat> images;
   for (const std::string& file : files) images.push_back(ws::read_image(file));
-  const ws::CalibratedImages calibrated =
+  ws::CalibratedImages calibrated =
       calibrated_images(arguments.rig, arguments.poses, files, images.front().size());
+  arguments.rig.leave_out_dark_rims(calibrated.rig, images);
   const ws::Rig& rig = calibrated.rig;
   const MatchSettings settings =
       with_range(arguments.settings, calibrated, arguments.rig.calibration);

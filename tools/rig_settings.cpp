@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "rig_settings.h"
 
+#include <cstdio>
 #include <numbers>
 #include <opencv2/core.hpp>
 
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
+#include "widestereo/lens.h"
 
 namespace ws = widestereo;
 
@@ -17,7 +19,11 @@ void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_othe
       ->required();
   command.add_option("--mask", masks,
                      "Image, 0 = ignore the pixel; once for all views or once for each");
-  command.add_option("--max-theta", max_theta, "Half angle of the lens's field of view, degrees")
+  command
+      .add_option(
+          "--max-theta", max_theta,
+          "Half angle of the lens's field of view, degrees; by default as calibrated, else where "
+          "images turn black, if they do")
       ->check(CLI::Range(1.0, 180.0));
 }
 
@@ -70,8 +76,7 @@ ws::CalibratedImages RigSettings::colmap_images(const std::vector<std::string>& 
 void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
   if (masks.size() > 1 && masks.size() != rig.views.size()) {
     throw ws::Error("--mask was given " + std::to_string(masks.size()) + " times for " +
-                    std::to_string(rig.views.size()) +
-                    " views; give one for all or one for each.");
+                    std::to_string(rig.views.size()) + " views; give one for all or one for each.");
   }
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     ws::View& view = rig.views[i];
@@ -80,5 +85,28 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
       const std::string& file = masks[masks.size() == 1 ? 0 : i];
       view.mask = ws::to_intensity(ws::read_image(file), file) > 0;
     }
+  }
+}
+
+void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& images) const {
+  if (max_theta > 0 || !masks.empty()) return;
+  const std::vector<ws::View> calibrated = rig.views;
+  for (std::size_t i = 0; i < calibrated.size(); ++i) {
+    const ws::Camera& camera = calibrated[i].camera;
+    if (camera.max_theta < std::numbers::pi) continue;
+    // One camera may have taken several views.
+    std::vector<cv::Mat> seen;
+    for (std::size_t j = 0; j < calibrated.size(); ++j) {
+      const bool fits = images[j].size() == cv::Size(camera.width, camera.height);
+      if (fits && calibrated[j].camera == camera) seen.push_back(images[j]);
+    }
+    const auto rim = ws::find_lens_rim(camera, seen);
+    if (!rim) continue;
+    rig.views[i].camera.max_theta = rim->usable;
+    std::fprintf(stderr,
+                 "widestereo: %s is black from %.1f degrees off the axis on and matched up to %.1f "
+                 "(--max-theta 180 matches all).\n",
+                 rig.views[i].name.c_str(), rim->dark * 180 / std::numbers::pi,
+                 rim->usable * 180 / std::numbers::pi);
   }
 }

@@ -14,7 +14,7 @@ struct RigSettings {
   std::string calibration;         ///< file, or folder of a COLMAP model
   std::vector<int> views;          ///< cameras of the calibration; empty: the first ones
   std::vector<std::string> masks;  ///< none, one for all images or one for each
-  double max_theta = 0;            ///< degrees, 0 = as calibrated
+  double max_theta = 0;            ///< degrees, 0 = as calibrated, or where images end
 
   /// Adds --calibration, --mask and --max-theta; `or_other`: what else --calibration may be.
   void add_whole_rig_to(CLI::App& command, const std::string& or_other = "");
@@ -27,6 +27,10 @@ struct RigSettings {
   widestereo::Rig rig_for_images(std::size_t image_count, cv::Size size) const;
   /// The same for files of a COLMAP model.
   widestereo::CalibratedImages colmap_images(const std::vector<std::string>& files) const;
+
+  /// Limits the cameras of which nothing says how far they see to what their images show, and says
+  /// so; one image for each view.
+  void leave_out_dark_rims(widestereo::Rig& rig, const std::vector<cv::Mat>& images) const;
 
  private:
   void limit_fields_of_view(widestereo::Rig& rig) const;

@@ -82,8 +82,10 @@ Selection select_frames(const SequenceArguments& a) {
     chosen.push_back(i);
     selection.frames.push_back(frames[i]);
   }
-  selection.rig =
-      a.rig.rig_for_images(cameras.size(), read_images(selection.frames.front()).front().size());
+  const std::vector<cv::Mat> first = read_images(selection.frames.front());
+  selection.rig = a.rig.rig_for_images(cameras.size(), first.front().size());
+  // The first frame alone decides, so that more frames may follow later.
+  a.rig.leave_out_dark_rims(selection.rig, first);
   if (a.poses.given()) {
     selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames, chosen);
   }

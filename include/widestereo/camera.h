@@ -45,6 +45,8 @@ struct Camera {
   /// invalid even where the model would project them (the model's domain is often wider than the
   /// lens).
   double max_theta = std::numbers::pi;
+
+  bool operator==(const Camera&) const = default;
 };
 
 /// Throws Error unless the camera's size and parameters are finite, in range and usable.

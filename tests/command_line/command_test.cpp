@@ -2,6 +2,7 @@
 // The command as a user meets it: results, messages, exit codes, and nothing half-written.
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "command_fixture.h"
 #include "data_folder.h"
@@ -284,6 +285,44 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   outcome = run("calibration check " + file("left.png") + " " + file("right.png") + " -c " +
                 file("calib.yaml") + " --json");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+}
+
+TEST_F(Command, DarkRimsAreLeftOut) {
+  std::ifstream stream(folder_ / "calib.yaml");
+  std::string text(std::istreambuf_iterator<char>(stream), {});
+  const std::string limit = "  max_theta_deg: 97.5\n";
+  text.erase(text.find(limit), limit.size());
+  folder_.write("unlimited.yaml", text);
+  cv::Mat circle(96, 96, CV_8UC3, cv::Scalar::all(0));
+  cv::circle(circle, {48, 48}, 42, cv::Scalar::all(255), cv::FILLED);
+  cv::Mat image = cv::imread(file("left.png"));
+  cv::bitwise_and(image, circle, image);
+  cv::imwrite(file("rim.png"), image);
+  const auto limits_of = [&](const std::string& arguments) {
+    fs::remove_all(folder_ / "out");
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    std::ifstream file(folder_ / "out/result.json");
+    const nlohmann::json views = nlohmann::json::parse(file)["views"];
+    return std::pair(views[1]["max_theta_degrees"].get<double>(),
+                     outcome.output.find("cam1 is black from") != std::string::npos);
+  };
+  const std::string depth = depth_of("rim.png", "rim.png", "unlimited.yaml");
+  const auto [found, told] = limits_of(depth);
+  EXPECT_NEAR(found, 69, 2);  // 42 pixels, by the formula of the double sphere
+  EXPECT_TRUE(told);
+  EXPECT_EQ(limits_of(depth + " --max-theta 180"), std::pair(180.0, false));
+  EXPECT_EQ(limits_of(depth + " --mask " + file("rim.png")), std::pair(180.0, false));
+  EXPECT_EQ(limits_of(depth_of("left.png", "right.png", "unlimited.yaml")),
+            std::pair(180.0, false));
+  for (const char* camera : {"cam0", "cam1"}) {
+    fs::create_directories(folder_ / "rims" / camera);
+    cv::imwrite((folder_ / "rims" / camera / "0.png").string(), image);
+  }
+  const Outcome outcome = run("sequence " + file("rims") + " -c " + file("unlimited.yaml") +
+                              " -o " + file("sequence") + quick);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("cam1 is black from"), std::string::npos) << outcome.output;
 }
 
 TEST_F(Command, CalibrationIsRefined) {

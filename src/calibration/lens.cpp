@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/lens.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "statistics/percentile.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr double ring_width = 0.5 * degree;
+constexpr std::size_t fewest_pixels = 50;                    // of a ring
+constexpr std::size_t fewest_dark_rings = 3;                 // fewer may be noise
+constexpr std::size_t plateau_begin = 40, plateau_end = 10;  // rings inside of the dark
+constexpr float noise = 4.0F / 255;                          // of black pixels
+constexpr double smallest_rim = 60 * degree;
+/// Reflections inside lenses reach no farther in.
+constexpr double widest_reflections = 0.08;  // of the angle
+
+/// Intensities by angle off the axis, from ring to ring.
+std::vector<std::vector<float>> rings_of(const Camera& camera, const cv::Mat& brightest) {
+  const cv::Mat rays = ray_image(camera, {});
+  // One more for angles that round up.
+  std::vector<std::vector<float>> rings(static_cast<std::size_t>(std::numbers::pi / ring_width) +
+                                        2);
+  for (int y = 0; y < rays.rows; ++y) {
+    for (int x = 0; x < rays.cols; ++x) {
+      const auto& ray = rays.at<cv::Vec4f>(y, x);
+      if (ray[3] == 0) continue;
+      const float theta = std::atan2(std::hypot(ray[0], ray[1]), ray[2]);
+      rings[static_cast<std::size_t>(theta / static_cast<float>(ring_width))].push_back(
+          brightest.at<float>(y, x));
+    }
+  }
+  // A corner of few pixels says little.
+  while (!rings.empty() && rings.back().size() < fewest_pixels) rings.pop_back();
+  return rings;
+}
+
+cv::Mat brightest_of(const Camera& camera, const std::vector<cv::Mat>& images) {
+  cv::Mat brightest(camera.height, camera.width, CV_32FC1, cv::Scalar(0));
+  for (const cv::Mat& image : images) {
+    if (image.size() != brightest.size()) {
+      throw Error("The rim of a lens needs images of the calibrated size, " +
+                  std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+                  " pixels, not " + std::to_string(image.cols) + "x" + std::to_string(image.rows) +
+                  ".");
+    }
+    cv::max(brightest, to_intensity(image, "An image"), brightest);
+  }
+  return brightest;
+}
+
+}  // namespace
+
+std::optional<LensRim> find_lens_rim(const Camera& camera, const std::vector<cv::Mat>& images) {
+  std::vector<std::vector<float>> rings = rings_of(camera, brightest_of(camera, images));
+  if (rings.size() < fewest_dark_rings) return std::nullopt;
+  std::vector<float> dark_pixels;
+  for (auto ring = rings.end() - fewest_dark_rings; ring != rings.end(); ++ring) {
+    dark_pixels.insert(dark_pixels.end(), ring->begin(), ring->end());
+  }
+  const float black = percentile(dark_pixels, 0.5);
+  const auto outermost = [&](std::size_t count, double share, float level) {
+    while (count > 0 && percentile(rings[count - 1], share) - black <= level) --count;
+    return count;
+  };
+  // Rings of which next to nothing is brighter than black.
+  const std::size_t lit = outermost(rings.size(), 0.95, noise);
+  if (rings.size() - lit < fewest_dark_rings) return std::nullopt;
+  std::vector<float> inside;
+  for (std::size_t i = lit - std::min(lit, plateau_begin); i + plateau_end < lit; ++i) {
+    if (!rings[i].empty()) inside.push_back(percentile(rings[i], 0.5) - black);
+  }
+  const std::size_t bright = outermost(lit, 0.5, std::max(percentile(inside, 0.5), noise) / 2);
+  LensRim rim;
+  rim.dark = static_cast<double>(lit) * ring_width;
+  rim.usable =
+      std::max(static_cast<double>(bright) * ring_width, (1 - widest_reflections) * rim.dark);
+  if (rim.usable < smallest_rim) return std::nullopt;
+  return rim;
+}
+
+}  // namespace widestereo
