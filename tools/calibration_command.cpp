@@ -218,6 +218,54 @@ nlohmann::ordered_json describe(const ws::RefinedValue& value) {
   return {{"change", value.change}, {"deviation", value.deviation}};
 }
 
+nlohmann::ordered_json to_json(const ws::RigRefinement& refined,
+                               const std::vector<ws::ViewMatches>& pairs) {
+  const std::vector<ws::View>& views = refined.rig.views;
+  nlohmann::ordered_json json;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    json["pairs"].push_back({{"first", views[pairs[i].first].name},
+                             {"second", views[pairs[i].second].name},
+                             {"matches", refined.before[i].matches},
+                             {"median_pixels_before", refined.before[i].median_pixels},
+                             {"median_pixels_after", refined.after[i].median_pixels}});
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const ws::ViewRefinement& view = refined.views[i];
+    json["views"].push_back({{"name", views[i].name},
+                             {"rotation_degrees", describe(view.rotation)},
+                             {"direction_degrees", describe(view.direction)},
+                             {"focal_length_percent", describe(view.focal_length)},
+                             {"principal_point_pixels", describe(view.principal_point)}});
+  }
+  return json;
+}
+
+void print(const ws::RigRefinement& refined, const std::vector<ws::ViewMatches>& pairs,
+           bool intrinsics) {
+  const std::vector<ws::View>& views = refined.rig.views;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    std::printf("%s - %s  %d matched features  epipolar error: median %.2f px -> %.2f px\n",
+                views[pairs[i].first].name.c_str(), views[pairs[i].second].name.c_str(),
+                refined.before[i].matches, refined.before[i].median_pixels,
+                refined.after[i].median_pixels);
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const ws::ViewRefinement& view = refined.views[i];
+    const char* name = views[i].name.c_str();
+    if (i > 0) {
+      std::printf(
+          "%s  turned by %.3f (+- %.3f) degrees, its direction from %s by %.2f (+- %.2f) degrees\n",
+          name, view.rotation.change, view.rotation.deviation, views[0].name.c_str(),
+          view.direction.change, view.direction.deviation);
+    }
+    if (intrinsics) {
+      std::printf("%s  f by %.2f (+- %.2f) %%, c by %.1f (+- %.1f) px\n", name,
+                  view.focal_length.change, view.focal_length.deviation,
+                  view.principal_point.change, view.principal_point.deviation);
+    }
+  }
+}
+
 void refine(const CalibrationArguments& arguments) {
   const ws::Rig rig = arguments.rig.whole_rig(ws::read_image(arguments.images.front()).size());
   const std::size_t count = rig.views.size();
@@ -232,44 +280,11 @@ void refine(const CalibrationArguments& arguments) {
   write(arguments, refined.rig);
   if (arguments.as_json) {
     nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      json["pairs"].push_back({{"first", rig.views[pairs[i].first].name},
-                               {"second", rig.views[pairs[i].second].name},
-                               {"matches", refined.before[i].matches},
-                               {"median_pixels_before", refined.before[i].median_pixels},
-                               {"median_pixels_after", refined.after[i].median_pixels}});
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      const ws::ViewRefinement& view = refined.views[i];
-      json["views"].push_back({{"name", rig.views[i].name},
-                               {"rotation_degrees", describe(view.rotation)},
-                               {"direction_degrees", describe(view.direction)},
-                               {"focal_length_percent", describe(view.focal_length)},
-                               {"principal_point_pixels", describe(view.principal_point)}});
-    }
+    json.update(to_json(refined, pairs));
     std::cout << json.dump(2) << "\n";
     return;
   }
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    std::printf("%s - %s  %d matched features  epipolar error: median %.2f px -> %.2f px\n",
-                rig.views[pairs[i].first].name.c_str(), rig.views[pairs[i].second].name.c_str(),
-                refined.before[i].matches, refined.before[i].median_pixels,
-                refined.after[i].median_pixels);
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const ws::ViewRefinement& view = refined.views[i];
-    if (i > 0) {
-      std::printf(
-          "%s  turned by %.3f (+- %.3f) degrees, its direction from %s by %.2f (+- %.2f) degrees\n",
-          rig.views[i].name.c_str(), view.rotation.change, view.rotation.deviation,
-          rig.views[0].name.c_str(), view.direction.change, view.direction.deviation);
-    }
-    if (arguments.intrinsics) {
-      std::printf("%s  f by %.2f (+- %.2f) %%, c by %.1f (+- %.1f) px\n", rig.views[i].name.c_str(),
-                  view.focal_length.change, view.focal_length.deviation,
-                  view.principal_point.change, view.principal_point.deviation);
-    }
-  }
+  print(refined, pairs, arguments.intrinsics);
   std::cout << "Wrote " << arguments.output << "\n";
 }
 
