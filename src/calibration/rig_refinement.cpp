@@ -278,14 +278,19 @@ RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, 
   RigRefinement result;
   result.before = check(rig, pairs);
   Refinement refinement(rig, pairs, intrinsics);
-  if (!refinement.solve()) {
-    throw Error(
-        "The matched features contradict each other, so that the rig cannot be refined; check that "
-        "the images are those of the calibration's cameras, in its order.");
-  }
+  const bool settled = refinement.solve();
   result.rig = refinement.rig();
   result.views = refinement.report();
   result.after = check(result.rig, pairs);
+  const bool obeyed =
+      std::all_of(result.after.begin(), result.after.end(),
+                  [](const EpipolarReport& report) { return report.below_5_pixels > 0.5; });
+  if (!settled || !obeyed) {
+    throw Error(
+        "The matched features contradict each other, so that the rig cannot be refined; check that "
+        "images matched with each other were taken at the same time, by the calibration's cameras "
+        "in its order.");
+  }
   return result;
 }
 

@@ -228,6 +228,10 @@ TEST(RigRefinement, BadInputHasOneSentence) {
   EXPECT_NE(test::error_of([&] { refine_rig(rig, matches); }).find("Only 7 features"),
             std::string::npos);
   EXPECT_THROW(refine_rig(rig, {}), Error);
+  // Images that do not belong together.
+  const std::vector<ViewMatches> unrelated = matches_of(rig, {.false_matches = 0.95});
+  EXPECT_NE(test::error_of([&] { refine_rig(rig, unrelated); }).find("contradict"),
+            std::string::npos);
 }
 
 TEST(RigRefinement, ARealRigGetsBetter) {
