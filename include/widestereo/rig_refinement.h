@@ -42,11 +42,11 @@ struct RigRefinement {
 /// focal lengths (both axes alike) and principal points of all views. Lengths of the baselines from
 /// view 0 stay as calibrated: matches tell nothing of scale. What matches do not determine stays
 /// near the calibration, which is taken to be accurate to 0.5 degrees of rotation, 2 degrees of
-/// direction, 1 % of focal length and 3 pixels of principal point.
-/// Minimises Sampson's epipolar error (Hartley, Zisserman, Multiple View Geometry, 2nd ed., section
-/// 11.4.3, with rays in place of homogeneous pixels), robustly, so that false matches do no harm.
-/// Throws Error when a pair names no two views of the rig, has fewer than 8 matches, or when the
-/// matches contradict each other.
+/// direction, 0.2 % of focal length (rays hardly tell a factor that all cameras share) and one
+/// pixel of principal point. Minimises Sampson's epipolar error (Hartley, Zisserman, Multiple View
+/// Geometry, 2nd ed., section 11.4.3, with rays in place of homogeneous pixels), robustly, so that
+/// false matches do no harm. Throws Error when a pair names no two views of the rig, has fewer than
+/// 8 matches, or when the matches contradict each other.
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs,
                          bool intrinsics = false);
 
