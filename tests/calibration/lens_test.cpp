@@ -123,8 +123,7 @@ TEST(LensRim, OfARealLens) {
   const auto set = test::data_folder() / "real/calicam_shun74";
   const Rig rig = read_calibration(set / "calib.yaml").rig;
   for (std::size_t i = 0; i < 2; ++i) {
-    const auto folder = set / ("cam" + std::to_string(i));
-    const auto image = std::filesystem::directory_iterator(folder)->path();
+    const auto image = set / ("cam" + std::to_string(i)) / "test-1.png";
     const auto rim = find_lens_rim(rig.views[i].camera, {read_image(image)});
     ASSERT_TRUE(rim) << image;
     // As seen: white-blue reflections from 94 degrees on, black from 98 on.
