@@ -13,6 +13,7 @@
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/rig_refinement.h"
+#include "widestereo/sharpness.h"
 
 namespace ws = widestereo;
 
@@ -164,7 +165,11 @@ void check(const CalibrationArguments& arguments) {
   const ws::View& second = images.rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);
   ws::require_calibrated_size(right, second, arguments.right);
-  const ws::EpipolarReport r = check_epipolar(first, second, ws::match_features(left, right));
+  const std::vector<ws::PixelMatch> matches = ws::match_features(left, right);
+  const ws::EpipolarReport r = check_epipolar(first, second, matches);
+  const auto sharpness = ws::compare_sharpness(left, right, matches);
+  // Negative where the second image is the sharper one.
+  const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
   const char* verdict = r.median_pixels < 0.5   ? "good"
                         : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"
                                                 : "too inaccurate for stereo: calibrate again";
@@ -177,6 +182,7 @@ void check(const CalibrationArguments& arguments) {
                                          {"distance_p5", r.nearest},
                                          {"distance_p50", r.typical},
                                          {"distance_p95", r.farthest},
+                                         {"first_sharper_by_pixels", blur},
                                          {"verdict", verdict}})
                      .dump(2)
               << "\n";
@@ -190,6 +196,10 @@ void check(const CalibrationArguments& arguments) {
       "calibration: %s\n",
       r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
       r.nearest, unit, r.typical, unit, r.farthest, unit, verdict);
+  if (!sharpness) return;
+  std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
+              (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),
+              sharpness->blur);
 }
 
 /// Matches between all pairs of views, those of all frames together.

@@ -10,6 +10,7 @@
 #include "pose_settings.h"
 #include "result_folder.h"
 #include "rig_settings.h"
+#include "sharpness_settings.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -26,6 +27,7 @@ struct DepthArguments {
   std::string output;
   RigSettings rig;
   PoseSettings poses;
+  SharpnessSettings sharpness;
   MatchSettings settings;
   FolderFormat format;
   bool as_json = false;
@@ -82,9 +84,10 @@ void run_depth(const DepthArguments& arguments) {
       with_range(arguments.settings, calibrated, arguments.rig.calibration);
   ws::prepare_output_folder(arguments.output);
 
-  const MatchingRun run = match_images(settings, rig, images);
+  const std::vector<double> blurs = arguments.sharpness.blurs(rig, images);
+  const MatchingRun run = match_images(settings, rig, blurred(images, blurs));
   FolderContents contents{
-      .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres};
+      .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres, .blurs = blurs};
   contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
@@ -109,6 +112,7 @@ void add_depth_command(CLI::App& app) {
                    "How many others of the model join one image, best first (default " +
                        std::to_string(default_sources) + ")")
       ->check(CLI::Range(1, most_images - 1));
+  arguments->sharpness.add_to(*command);
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record as JSON");

@@ -52,6 +52,7 @@ class ViewWriter {
             {"width", view_.camera.width},
             {"height", view_.camera.height},
             {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
+            {"blur_pixels", contents_.blurs.empty() ? 0 : contents_.blurs[index_]},
             {"accepted", accepted_share(result_)},
             {"filled", share_of_usable(result_, (result_.reasons & ws::reason_filled) != 0)},
             {"mean_cost", scores.mean_cost},

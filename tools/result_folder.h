@@ -35,6 +35,7 @@ struct FolderContents {
   const std::vector<cv::Mat>& images;
   const MatchingRun& run;
   bool in_metres = true;                              ///< else in a reconstruction's unit
+  std::vector<double> blurs = {};                     ///< pixels, one for each view, or none
   nlohmann::ordered_json origin = {};                 ///< where the images came from
   std::vector<widestereo::GroundTruth> truths = {};   ///< one for each view, or none
   std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none

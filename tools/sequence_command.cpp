@@ -18,6 +18,7 @@
 #include "result_folder.h"
 #include "rig_settings.h"
 #include "sequence_folder.h"
+#include "sharpness_settings.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/motion.h"
@@ -42,6 +43,7 @@ struct SequenceArguments {
   bool skip_incomplete = false;
   bool overwrite = false;
   RigSettings rig;
+  SharpnessSettings sharpness;
   MatchSettings settings;
   FolderFormat format;
   bool as_json = false;
@@ -51,7 +53,8 @@ struct SequenceArguments {
 struct Selection {
   std::vector<ws::SequenceFrame> frames;
   ws::Rig rig;
-  RigPoses motion;  ///< no poses where they are not known
+  std::vector<double> blurs;  ///< of each view's images before they are matched, pixels
+  RigPoses motion;            ///< no poses where they are not known
   std::vector<std::string> names() const {
     std::vector<std::string> names;
     for (const ws::SequenceFrame& frame : frames) names.push_back(frame.name);
@@ -86,6 +89,7 @@ Selection select_frames(const SequenceArguments& a) {
   selection.rig = a.rig.rig_for_images(cameras.size(), first.front().size());
   // The first frame alone decides, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);
+  selection.blurs = a.sharpness.blurs(selection.rig, first);
   if (a.poses.given()) {
     selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames, chosen);
   }
@@ -130,6 +134,7 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"dataset", absolute(a.dataset)},
                    {"calibration", absolute(a.rig.calibration)},
                    {"masks", a.rig.masks},
+                   {"blurs", selection.blurs},
                    {"poses", absolute(a.poses.file)},
                    {"poses_of", selection.motion.of},
                    {"poses_tolerance", a.poses.tolerance},
@@ -207,8 +212,9 @@ class SequenceRun {
 
   void take_up(std::size_t last) {
     const ws::SequenceFrame& frame = selection_.frames[last];
-    previous_ = {read_images(frame), folder_.planes(frame.name, selection_.rig)};
-    require_sizes(frame, previous_.images, selection_.rig);
+    const std::vector<cv::Mat> images = read_images(frame);
+    require_sizes(frame, images, selection_.rig);
+    previous_ = {blurred(images, selection_.blurs), folder_.planes(frame.name, selection_.rig)};
     for (const Json& record : folder_.frames()) note_cold(record);
   }
 
@@ -219,8 +225,9 @@ class SequenceRun {
 
   void match(ws::Matcher& matcher, std::size_t index) {
     const ws::SequenceFrame& source = selection_.frames[index];
-    const std::vector<cv::Mat> images = read_images(source);
-    require_sizes(source, images, selection_.rig);
+    const std::vector<cv::Mat> taken = read_images(source);
+    require_sizes(source, taken, selection_.rig);
+    const std::vector<cv::Mat> images = blurred(taken, selection_.blurs);
     ws::Matcher::Progress progress;
     if (bar_.visible()) {  // without it a device need not wait between kernels
       progress = [this](double share) {
@@ -245,7 +252,7 @@ class SequenceRun {
       }
     }
     require_no_validation_messages(device_);
-    write(source, images, frame);
+    write(source, taken, frame);
     previous_ = {images, std::move(result.views), true};
     ++matched_;
   }
@@ -294,7 +301,8 @@ class SequenceRun {
                    {"mean_cost", quality.mean_cost}};
     note_cold(record);
     folder_.add(source.name, result.views, [&](const fs::path& folder) {
-      FolderContents contents{.rig = selection_.rig, .images = images, .run = frame.run};
+      FolderContents contents{
+          .rig = selection_.rig, .images = images, .run = frame.run, .blurs = selection_.blurs};
       for (const fs::path& image : source.images)
         contents.origin["images"].push_back(image.string());
       contents.origin["calibration"] = arguments_.rig.calibration;
@@ -367,6 +375,7 @@ void add_sequence_command(CLI::App& app) {
           "VI layout (mav0/camN/data, data.csv)")
       ->required();
   a->rig.add_to(*command);
+  a->sharpness.add_to(*command);
   command
       ->add_option("-o,--output", a->output,
                    "Folder for the results: one folder for each frame, and sequence.json")

@@ -325,6 +325,44 @@ TEST_F(Command, DarkRimsAreLeftOut) {
   EXPECT_NE(outcome.output.find("cam1 is black from"), std::string::npos) << outcome.output;
 }
 
+TEST_F(Command, SharperImageIsBlurred) {
+  cv::Mat image = cv::imread(file("left.png"));
+  cv::GaussianBlur(image, image, {}, 1);
+  cv::imwrite(file("left.png"), image);
+  cv::GaussianBlur(image, image, {}, 1.2);
+  cv::imwrite(file("blunt.png"), image);
+  const auto blurs_of = [&](const std::string& arguments) {
+    fs::remove_all(folder_ / "out");
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_EQ(outcome.output.find("sharper than") != std::string::npos,
+              arguments.find("blur ") == std::string::npos &&
+                  arguments.find("blunt") != std::string::npos)
+        << outcome.output;
+    std::ifstream file(folder_ / "out/result.json");
+    const nlohmann::json views = nlohmann::json::parse(file)["views"];
+    return std::pair(views[0]["blur_pixels"].get<double>(), views[1]["blur_pixels"].get<double>());
+  };
+  const auto [first, second] = blurs_of(depth_of("left.png", "blunt.png"));
+  EXPECT_NEAR(first, 1.2, 0.2);
+  EXPECT_EQ(second, 0);
+  const cv::Mat found = cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED);
+  // What is matched is what the option would have made of it.
+  const std::string value = nlohmann::json(first).dump();
+  EXPECT_EQ(blurs_of(depth_of("left.png", "blunt.png") + " --blur " + value + ",0"),
+            std::pair(std::stod(value), 0.0));
+  EXPECT_EQ(cv::norm(found, cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED)), 0);
+  EXPECT_EQ(blurs_of(depth_of("left.png", "blunt.png") + " --blur 0"), std::pair(0.0, 0.0));
+  EXPECT_GT(cv::norm(found, cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED)), 0);
+  EXPECT_EQ(blurs_of(depth_of("left.png", "left.png")), std::pair(0.0, 0.0));
+  fs::remove_all(folder_ / "out");
+  expect_error(depth_of("left.png", "blunt.png") + " --blur 1,2,3", "--blur was given 3 values");
+  const Outcome check = run("calibration check " + file("blunt.png") + " " + file("left.png") +
+                            " -c " + file("calib.yaml"));
+  EXPECT_NE(check.output.find("cam0 is as sharp as cam1 blurred by 1."), std::string::npos)
+      << check.output;
+}
+
 TEST_F(Command, CalibrationIsRefined) {
   std::ifstream stream(folder_ / "calib.yaml");
   std::string text(std::istreambuf_iterator<char>(stream), {});

@@ -24,10 +24,10 @@ class SequenceCommand : public Command {
     for (int k = 0; k < 3; ++k) add_frame(k, "00" + std::to_string(k), 3);
   }
 
-  void add_frame(int k, const std::string& name, int seed) const {
+  void add_frame(int k, const std::string& name, int seed, double blur = 1.2) const {
     cv::Mat noise(96, 130, CV_8UC1);
     cv::RNG(seed).fill(noise, cv::RNG::UNIFORM, 0, 255);
-    cv::GaussianBlur(noise, noise, {}, 1.2);
+    cv::GaussianBlur(noise, noise, {}, blur);
     for (int camera = 0; camera < 2; ++camera) {
       const fs::path folder = folder_ / ("data/cam" + std::to_string(camera));
       fs::create_directories(folder);
@@ -54,6 +54,29 @@ class SequenceCommand : public Command {
     }
   }
 };
+
+TEST_F(SequenceCommand, BlursTheSharperCameraOfAllFrames) {
+  for (int k = 0; k < 3; ++k) {
+    const std::string name = "00" + std::to_string(k);
+    add_frame(k, name, 3, 0.8);
+    const std::string blunt = file("data/cam1/" + name + ".png");
+    cv::Mat image = cv::imread(blunt, cv::IMREAD_UNCHANGED);
+    cv::GaussianBlur(image, image, {}, 1.2);
+    cv::imwrite(blunt, image);
+  }
+  Outcome outcome = run(sequence() + "--count 2");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("cam0 is sharper than cam1"), std::string::npos) << outcome.output;
+  const nlohmann::json blurs = record()["settings"]["blurs"];
+  EXPECT_NEAR(blurs[0].get<double>(), 1.2, 0.2);
+  EXPECT_EQ(blurs[1], 0);
+  // Resumed with the same blur, which the first frame alone decides.
+  outcome = run(sequence());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(record()["settings"]["blurs"], blurs);
+  ASSERT_EQ(run(sequence("whole")).exit_code, 0);
+  expect_same_results("out", "whole");
+}
 
 TEST_F(SequenceCommand, StartsEachFrameFromTheOneBefore) {
   const Outcome outcome = run(sequence() + "--restart-below 0");

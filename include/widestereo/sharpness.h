@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "widestereo/epipolar.h"
+
+namespace widestereo {
+
+/// One image of a pair shows finer detail than the other, as where lenses are focused differently.
+/// Patches that are not alike match with an error; blurring the sharper image mends most of it.
+struct SharpnessDifference {
+  int sharper = 0;  ///< 0: the first image, 1: the second
+  double blur = 0;  ///< standard deviation, pixels, of the Gaussian that makes it like the other
+};
+
+/// Compares the share of fine detail around matched features (match_features()) of two images, 8 or
+/// 16 bit or as to_intensity() returns them. None where they differ by less than a blur of 0.7
+/// pixels, as noise in one image alone may have it, or matches are too few to tell; never more than
+/// 3 pixels. Exposure does not count. Throws
+/// Error on images of another kind.
+std::optional<SharpnessDifference> compare_sharpness(const cv::Mat& first, const cv::Mat& second,
+                                                     const std::vector<PixelMatch>& matches);
+
+/// Blurred by a Gaussian of that standard deviation (pixels); as it is for 0.
+cv::Mat blurred(const cv::Mat& image, double blur);
+
+}  // namespace widestereo

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/sharpness.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "statistics/percentile.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+// Standard deviations, pixels, of the scales compared. At the finer one noise hardly counts around
+// features yet; the coarser one says how strong their edges are.
+constexpr double fine_scale = 0.7;
+constexpr double coarse_scale = 2;
+constexpr int window = 9;
+constexpr float weakest_edge = 1.0F / 255;  // per pixel, at the coarse scale
+constexpr std::size_t fewest_matches = 30;
+constexpr double smallest_blur = 0.7;  // noise in one image, or a step forward, looks like less
+constexpr double largest_blur = 3;
+constexpr double bisection_end = 0.01;
+constexpr double certain = 3;  // standard errors
+
+/// Mean squared gradient (per pixel) of the surroundings of each pixel, at one scale.
+cv::Mat edge_energy(const cv::Mat& intensity, double scale) {
+  const cv::Mat smooth = blurred(intensity, scale);
+  cv::Mat dx;
+  cv::Mat dy;
+  cv::Sobel(smooth, dx, CV_32F, 1, 0, 3, 1.0 / 8);
+  cv::Sobel(smooth, dy, CV_32F, 0, 1, 3, 1.0 / 8);
+  cv::Mat energy = dx.mul(dx) + dy.mul(dy);
+  cv::blur(energy, energy, {window, window});
+  return energy;
+}
+
+cv::Point pixel_of(const Eigen::Vector2d& point, const cv::Mat& image) {
+  return {std::clamp(cvRound(point.x()), 0, image.cols - 1),
+          std::clamp(cvRound(point.y()), 0, image.rows - 1)};
+}
+
+/// At each point the logarithm of the fine scale's share; NaN where there is no edge.
+std::vector<double> detail_at(const cv::Mat& intensity, const std::vector<cv::Point>& points) {
+  const cv::Mat fine = edge_energy(intensity, fine_scale);
+  const cv::Mat coarse = edge_energy(intensity, coarse_scale);
+  std::vector<double> detail;
+  for (const cv::Point& point : points) {
+    const float edge = coarse.at<float>(point);
+    detail.push_back(edge < weakest_edge * weakest_edge
+                         ? std::nan("")
+                         : std::log(static_cast<double>(fine.at<float>(point) / edge)));
+  }
+  return detail;
+}
+
+struct Estimate {
+  double value = 0;
+  double error = 0;  ///< standard deviation
+};
+
+/// By how much `a` exceeds `b` where both are known, by the median; none from too few.
+std::optional<Estimate> excess(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> differences;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (std::isfinite(a[i] - b[i])) differences.push_back(a[i] - b[i]);
+  }
+  if (differences.size() < fewest_matches) return std::nullopt;
+  Estimate estimate{.value = percentile(differences, 0.5)};
+  for (double& difference : differences) difference = std::abs(difference - estimate.value);
+  // A median's deviation, from the median absolute one of what it is taken of.
+  estimate.error = 1.253 * 1.483 * percentile(differences, 0.5) /
+                   std::sqrt(static_cast<double>(differences.size()));
+  return estimate;
+}
+
+}  // namespace
+
+std::optional<SharpnessDifference> compare_sharpness(const cv::Mat& first, const cv::Mat& second,
+                                                     const std::vector<PixelMatch>& matches) {
+  cv::Mat sharp = to_intensity(first, "The first image");
+  cv::Mat blunt = to_intensity(second, "The second image");
+  std::vector<cv::Point> in_sharp;
+  std::vector<cv::Point> in_blunt;
+  for (const PixelMatch& match : matches) {
+    in_sharp.push_back(pixel_of(match.first, sharp));
+    in_blunt.push_back(pixel_of(match.second, blunt));
+  }
+  std::vector<double> target = detail_at(blunt, in_blunt);
+  const auto found = excess(detail_at(sharp, in_sharp), target);
+  if (!found || std::abs(found->value) < certain * found->error) return std::nullopt;
+  SharpnessDifference difference;
+  if (found->value < 0) {
+    difference.sharper = 1;
+    std::swap(sharp, blunt);
+    std::swap(in_sharp, in_blunt);
+    target = detail_at(blunt, in_blunt);
+  }
+  double low = 0;
+  double high = largest_blur;
+  while (high - low > bisection_end) {
+    difference.blur = (low + high) / 2;
+    const auto left = excess(detail_at(blurred(sharp, difference.blur), in_sharp), target);
+    (left && left->value > 0 ? low : high) = difference.blur;
+  }
+  if (difference.blur < smallest_blur) return std::nullopt;
+  return difference;
+}
+
+cv::Mat blurred(const cv::Mat& image, double blur) {
+  if (blur <= 0) return image;
+  cv::Mat result;
+  cv::GaussianBlur(image, result, {}, blur, blur, cv::BORDER_REPLICATE);
+  return result;
+}
+
+}  // namespace widestereo

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/sharpness.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "data_folder.h"
+#include "error_of.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace widestereo {
+namespace {
+
+constexpr int size = 256;
+constexpr int shift = 7;  // pixels that the second image is displaced by
+
+/// Blocks of random intensities, as a lens of little blur shows them; float, grey levels.
+cv::Mat scene() {
+  cv::RNG random(5);
+  cv::Mat blocks(size / 4, size / 4, CV_32FC1);
+  random.fill(blocks, cv::RNG::UNIFORM, 60, 190);
+  cv::resize(blocks, blocks, {size, size}, 0, 0, cv::INTER_NEAREST);
+  return blurred(blocks, 0.6);
+}
+
+cv::Mat displaced(const cv::Mat& image) {
+  cv::Mat result;
+  cv::copyMakeBorder(image, result, 0, 0, shift, 0, cv::BORDER_REFLECT);
+  return result.colRange(0, size);
+}
+
+cv::Mat grey_levels(const cv::Mat& image, double noise = 0) {
+  cv::Mat grains(image.size(), CV_32FC1);
+  cv::RNG(9).fill(grains, cv::RNG::NORMAL, 0, noise);
+  cv::Mat result;
+  cv::Mat(image + grains).convertTo(result, CV_8U);
+  return result;
+}
+
+std::vector<PixelMatch> grid(int step = 11) {
+  std::vector<PixelMatch> matches;
+  for (int y = 4; y < size; y += step) {
+    for (int x = 4; x + shift < size; x += step) matches.push_back({{x, y}, {x + shift, y}});
+  }
+  return matches;
+}
+
+TEST(Sharpness, DifferenceIsTheBlurThatWasAdded) {
+  for (const double blur : {0.9, 1.2, 2.0}) {
+    const cv::Mat sharp = grey_levels(scene());
+    const cv::Mat blunt = grey_levels(displaced(blurred(scene(), blur)));
+    const auto first = compare_sharpness(sharp, blunt, grid());
+    ASSERT_TRUE(first);
+    EXPECT_EQ(first->sharper, 0);
+    EXPECT_NEAR(first->blur, blur, 0.05 * blur);
+    std::vector<PixelMatch> swapped = grid();
+    for (PixelMatch& match : swapped) std::swap(match.first, match.second);
+    const auto second = compare_sharpness(blunt, sharp, swapped);
+    ASSERT_TRUE(second);
+    EXPECT_EQ(second->sharper, 1);
+    EXPECT_EQ(second->blur, first->blur);
+  }
+}
+
+TEST(Sharpness, ExposureDoesNotCount) {
+  const cv::Mat sharp = grey_levels(scene());
+  const cv::Mat dark = 0.3 * displaced(scene()) + 30;
+  EXPECT_FALSE(compare_sharpness(sharp, grey_levels(dark), grid()));
+  cv::Mat deep;
+  cv::Mat(0.3 * displaced(blurred(scene(), 1.5)) + 30).convertTo(deep, CV_16U, 257);
+  const auto found = compare_sharpness(sharp, deep, grid());
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->sharper, 0);
+  EXPECT_NEAR(found->blur, 1.5, 0.1);
+}
+
+TEST(Sharpness, NoiseOfOneImageIsNone) {
+  const cv::Mat image = grey_levels(scene());
+  const cv::Mat noisy = grey_levels(displaced(scene()), 6);
+  EXPECT_FALSE(compare_sharpness(image, noisy, grid()));
+  EXPECT_FALSE(compare_sharpness(noisy, image, grid()));
+}
+
+TEST(Sharpness, NoisyImagesDifferToo) {
+  const auto found = compare_sharpness(grey_levels(scene(), 3),
+                                       grey_levels(displaced(blurred(scene(), 1.5))), grid());
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->sharper, 0);
+  EXPECT_NEAR(found->blur, 1.5, 0.15);
+}
+
+TEST(Sharpness, FewFalseMatchesAreHarmless) {
+  std::vector<PixelMatch> matches = grid();
+  for (std::size_t i = 0; i < matches.size(); i += 4) matches[i].second = {size - 0.4, 0};
+  const auto found = compare_sharpness(grey_levels(scene()),
+                                       grey_levels(displaced(blurred(scene(), 1.5))), matches);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->blur, 1.5, 0.2);
+}
+
+TEST(Sharpness, NothingIsSaidOfTooLittle) {
+  const cv::Mat sharp = grey_levels(scene());
+  const cv::Mat blunt = grey_levels(displaced(blurred(scene(), 2)));
+  EXPECT_FALSE(compare_sharpness(sharp, blunt, {}));
+  EXPECT_FALSE(compare_sharpness(sharp, blunt, grid(60)));
+  const cv::Mat flat(size, size, CV_8UC1, cv::Scalar(90));
+  EXPECT_FALSE(compare_sharpness(sharp, flat, grid()));
+  EXPECT_FALSE(compare_sharpness(flat, flat, grid()));
+}
+
+TEST(Sharpness, OtherImagesAreRefused) {
+  const cv::Mat sharp = grey_levels(scene());
+  EXPECT_NE(test::error_of([&] { compare_sharpness(sharp, {}, grid()); }).find("second image"),
+            std::string::npos);
+}
+
+TEST(Sharpness, BlurOfNothingIsTheImage) {
+  const cv::Mat image = grey_levels(scene());
+  EXPECT_EQ(blurred(image, 0).data, image.data);
+  cv::Mat difference;
+  cv::absdiff(blurred(image, 1), image, difference);
+  EXPECT_GT(cv::mean(difference)[0], 3);
+}
+
+TEST(Sharpness, OfRenderedPairs) {
+  const auto data = test::data_folder();
+  if (data.empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  for (const char* set : {"desk_tumvi", "warehouse_expo", "street_forward_omni"}) {
+    SCOPED_TRACE(set);
+    const cv::Mat left = read_image(data / "synthetic" / set / "cam0.png");
+    cv::Mat right = read_image(data / "synthetic" / set / "cam1.png");
+    EXPECT_FALSE(compare_sharpness(left, right, match_features(left, right)));
+    right = blurred(right, 1.2);
+    const auto found = compare_sharpness(left, right, match_features(left, right));
+    ASSERT_TRUE(found);
+    EXPECT_EQ(found->sharper, 0);
+    EXPECT_NEAR(found->blur, 1.2, 0.3);  // the second camera of the street is nearer
+  }
+}
+
+}  // namespace
+}  // namespace widestereo

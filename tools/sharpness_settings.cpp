@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#include "sharpness_settings.h"
+
+#include <cstdio>
+
+#include "widestereo/epipolar.h"
+#include "widestereo/error.h"
+#include "widestereo/sharpness.h"
+
+namespace ws = widestereo;
+
+void SharpnessSettings::add_to(CLI::App& command) {
+  command
+      .add_option("--blur", given_,
+                  "Blur images before they are matched: standard deviation, pixels, once for all "
+                  "views or once for each, 0 = do not; by default the sharper image of a pair, "
+                  "where the two differ")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 10.0));
+}
+
+std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig,
+                                             const std::vector<cv::Mat>& images) const {
+  const std::size_t count = rig.views.size();
+  if (given_.size() > 1 && given_.size() != count) {
+    throw ws::Error("--blur was given " + std::to_string(given_.size()) + " values for " +
+                    std::to_string(count) + " views; give one for all or one for each.");
+  }
+  if (given_.size() == count) return given_;
+  std::vector<double> blurs(count, given_.empty() ? 0 : given_.front());
+  // Of more views each has sources that are as sharp as itself, or sharper ones that it needs.
+  if (!given_.empty() || count != 2) return blurs;
+  const auto difference =
+      ws::compare_sharpness(images[0], images[1], ws::match_features(images[0], images[1]));
+  if (!difference) return blurs;
+  const auto sharper = static_cast<std::size_t>(difference->sharper);
+  blurs[sharper] = difference->blur;
+  std::fprintf(stderr,
+               "widestereo: %s is sharper than %s and blurred by %.2f pixels before it is matched "
+               "(--blur 0 matches it as it is).\n",
+               rig.views[sharper].name.c_str(), rig.views[1 - sharper].name.c_str(),
+               difference->blur);
+  return blurs;
+}
+
+std::vector<cv::Mat> blurred(const std::vector<cv::Mat>& images, const std::vector<double>& blurs) {
+  std::vector<cv::Mat> results;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    results.push_back(ws::blurred(images[i], blurs[i]));
+  }
+  return results;
+}
