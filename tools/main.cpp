@@ -5,6 +5,18 @@
 #include "commands.h"
 #include "widestereo/error.h"
 
+namespace {
+
+/// Options of several values take one word each, so that they may stand before images.
+void end_options_after_a_word(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    if (!option->get_positional()) option->allow_extra_args(false);
+  }
+  for (CLI::App* command : app.get_subcommands(nullptr)) end_options_after_a_word(*command);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   CLI::App app{
       "widestereo: dense stereo directly on ultra-wide-angle (fisheye) images, without "
@@ -19,6 +31,7 @@ int main(int argc, char** argv) {
   add_calibration_command(app);
   add_devices_command(app);
   add_benchmark_command(app);
+  end_options_after_a_word(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -325,6 +325,19 @@ TEST_F(Command, DarkRimsAreLeftOut) {
   EXPECT_NE(outcome.output.find("cam1 is black from"), std::string::npos) << outcome.output;
 }
 
+TEST_F(Command, OptionsMayStandBeforeImages) {
+  cv::imwrite(file("mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  const std::string images = file("left.png") + " " + file("right.png");
+  const std::string rest = " -c " + file("calib.yaml") + " -o " + file("out") + quick;
+  for (const std::string& option :
+       {"--mask " + file("mask.png") + " --mask " + file("mask.png"), std::string("--views 0,1"),
+        std::string("--blur 0.5,0"), std::string("--formats tiff,pfm")}) {
+    const Outcome outcome = run("depth " + option + " " + images + rest);
+    EXPECT_EQ(outcome.exit_code, 0) << option << "\n" << outcome.output;
+  }
+  EXPECT_TRUE(fs::exists(folder_ / "out/distance0.pfm"));
+}
+
 TEST_F(Command, SharperImageIsBlurred) {
   cv::Mat image = cv::imread(file("left.png"));
   cv::GaussianBlur(image, image, {}, 1);
