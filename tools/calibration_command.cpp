@@ -167,7 +167,7 @@ void check(const CalibrationArguments& arguments) {
   ws::require_calibrated_size(right, second, arguments.right);
   const std::vector<ws::PixelMatch> matches = ws::match_features(left, right);
   const ws::EpipolarReport r = check_epipolar(first, second, matches);
-  const auto sharpness = ws::compare_sharpness(left, right, matches);
+  const auto sharpness = ws::compare_sharpness(first, second, left, right, matches);
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
   const char* verdict = r.median_pixels < 0.5   ? "good"

@@ -30,8 +30,8 @@ std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig,
   std::vector<double> blurs(count, given_.empty() ? 0 : given_.front());
   // Of more views each has sources that are as sharp as itself, or sharper ones that it needs.
   if (!given_.empty() || count != 2) return blurs;
-  const auto difference =
-      ws::compare_sharpness(images[0], images[1], ws::match_features(images[0], images[1]));
+  const auto difference = ws::compare_sharpness(rig.views[0], rig.views[1], images[0], images[1],
+                                                ws::match_features(images[0], images[1]));
   if (!difference) return blurs;
   const auto sharper = static_cast<std::size_t>(difference->sharper);
   blurs[sharper] = difference->blur;

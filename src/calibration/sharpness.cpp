@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/sharpness.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -19,7 +20,8 @@ constexpr double coarse_scale = 2;
 constexpr int window = 9;
 constexpr float weakest_edge = 1.0F / 255;  // per pixel, at the coarse scale
 constexpr std::size_t fewest_matches = 30;
-constexpr double smallest_blur = 0.7;  // noise in one image, or a step forward, looks like less
+constexpr double largest_scale = 1.2;  // of a feature in one image to that in the other
+constexpr double smallest_blur = 0.7;  // noise in one image looks like less
 constexpr double largest_blur = 3;
 constexpr double bisection_end = 0.01;
 constexpr double certain = 3;  // standard errors
@@ -40,6 +42,53 @@ cv::Point pixel_of(const Eigen::Vector2d& point, const cv::Mat& image) {
   return {std::clamp(cvRound(point.x()), 0, image.cols - 1),
           std::clamp(cvRound(point.y()), 0, image.rows - 1)};
 }
+
+/// Side, radians, of the square that a pixel's rays fill; none where there are none.
+std::optional<double> pixel_angle(const Camera& camera, const Eigen::Vector2d& pixel) {
+  Eigen::Vector3d left;
+  Eigen::Vector3d right;
+  Eigen::Vector3d above;
+  Eigen::Vector3d below;
+  if (!unproject(camera, pixel - Eigen::Vector2d(0.5, 0), left) ||
+      !unproject(camera, pixel + Eigen::Vector2d(0.5, 0), right) ||
+      !unproject(camera, pixel - Eigen::Vector2d(0, 0.5), above) ||
+      !unproject(camera, pixel + Eigen::Vector2d(0, 0.5), below)) {
+    return std::nullopt;
+  }
+  return std::sqrt((right - left).cross(below - above).norm());
+}
+
+/// Whether a feature is about as large in both images: detail of another size would pass for blur.
+class EqualScale {
+ public:
+  EqualScale(const View& first, const View& second)
+      : first_(first), second_(second), motion_(source_from_reference(second, first)) {}
+
+  bool operator()(const PixelMatch& match) const {
+    Eigen::Vector3d ray_first;
+    Eigen::Vector3d ray_second;
+    if (is_masked(first_, match.first) || is_masked(second_, match.second) ||
+        !unproject(first_.camera, match.first, ray_first) ||
+        !unproject(second_.camera, match.second, ray_second)) {
+      return false;
+    }
+    const auto angle_first = pixel_angle(first_.camera, match.first);
+    const auto angle_second = pixel_angle(second_.camera, match.second);
+    if (!angle_first || !angle_second) return false;
+    // The law of sines gives the ratio of the distances.
+    const Eigen::Vector3d baseline = motion_.translation();
+    const double to_first = baseline.cross(motion_.linear() * ray_first).norm();
+    const double to_second = baseline.cross(ray_second).norm();
+    const double distance_ratio = baseline.isZero() ? 1 : to_second / to_first;
+    const double scale = distance_ratio * *angle_first / *angle_second;
+    return scale < largest_scale && scale > 1 / largest_scale;
+  }
+
+ private:
+  const View& first_;
+  const View& second_;
+  Eigen::Isometry3d motion_;
+};
 
 /// At each point the logarithm of the fine scale's share; NaN where there is no edge.
 std::vector<double> detail_at(const cv::Mat& intensity, const std::vector<cv::Point>& points) {
@@ -77,13 +126,17 @@ std::optional<Estimate> excess(const std::vector<double>& a, const std::vector<d
 
 }  // namespace
 
-std::optional<SharpnessDifference> compare_sharpness(const cv::Mat& first, const cv::Mat& second,
+std::optional<SharpnessDifference> compare_sharpness(const View& first, const View& second,
+                                                     const cv::Mat& first_image,
+                                                     const cv::Mat& second_image,
                                                      const std::vector<PixelMatch>& matches) {
-  cv::Mat sharp = to_intensity(first, "The first image");
-  cv::Mat blunt = to_intensity(second, "The second image");
+  cv::Mat sharp = to_intensity(first_image, "The first image");
+  cv::Mat blunt = to_intensity(second_image, "The second image");
+  const EqualScale equal_scale(first, second);
   std::vector<cv::Point> in_sharp;
   std::vector<cv::Point> in_blunt;
   for (const PixelMatch& match : matches) {
+    if (!equal_scale(match)) continue;
     in_sharp.push_back(pixel_of(match.first, sharp));
     in_blunt.push_back(pixel_of(match.second, blunt));
   }

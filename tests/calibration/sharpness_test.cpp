@@ -3,12 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "data_folder.h"
 #include "error_of.h"
+#include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -41,6 +42,16 @@ cv::Mat grey_levels(const cv::Mat& image, double noise = 0) {
   return result;
 }
 
+View view(double x = 0, double focal_length = 180) {
+  View view;
+  view.camera.model = CameraModel::pinhole_radtan;
+  view.camera.width = view.camera.height = size;
+  view.camera.fx = view.camera.fy = focal_length;
+  view.camera.cx = view.camera.cy = size / 2.;
+  view.world_from_camera = Eigen::Translation3d(x, 0, 0);
+  return view;
+}
+
 std::vector<PixelMatch> grid(int step = 11) {
   std::vector<PixelMatch> matches;
   for (int y = 4; y < size; y += step) {
@@ -49,17 +60,23 @@ std::vector<PixelMatch> grid(int step = 11) {
   return matches;
 }
 
+/// Of images side by side, the second one displaced.
+std::optional<SharpnessDifference> compare(const cv::Mat& first, const cv::Mat& second,
+                                           const std::vector<PixelMatch>& matches) {
+  return compare_sharpness(view(), view(-0.1), first, second, matches);
+}
+
 TEST(Sharpness, DifferenceIsTheBlurThatWasAdded) {
   for (const double blur : {0.9, 1.2, 2.0}) {
     const cv::Mat sharp = grey_levels(scene());
     const cv::Mat blunt = grey_levels(displaced(blurred(scene(), blur)));
-    const auto first = compare_sharpness(sharp, blunt, grid());
+    const auto first = compare(sharp, blunt, grid());
     ASSERT_TRUE(first);
     EXPECT_EQ(first->sharper, 0);
     EXPECT_NEAR(first->blur, blur, 0.05 * blur);
     std::vector<PixelMatch> swapped = grid();
     for (PixelMatch& match : swapped) std::swap(match.first, match.second);
-    const auto second = compare_sharpness(blunt, sharp, swapped);
+    const auto second = compare(blunt, sharp, swapped);
     ASSERT_TRUE(second);
     EXPECT_EQ(second->sharper, 1);
     EXPECT_EQ(second->blur, first->blur);
@@ -69,10 +86,10 @@ TEST(Sharpness, DifferenceIsTheBlurThatWasAdded) {
 TEST(Sharpness, ExposureDoesNotCount) {
   const cv::Mat sharp = grey_levels(scene());
   const cv::Mat dark = 0.3 * displaced(scene()) + 30;
-  EXPECT_FALSE(compare_sharpness(sharp, grey_levels(dark), grid()));
+  EXPECT_FALSE(compare(sharp, grey_levels(dark), grid()));
   cv::Mat deep;
   cv::Mat(0.3 * displaced(blurred(scene(), 1.5)) + 30).convertTo(deep, CV_16U, 257);
-  const auto found = compare_sharpness(sharp, deep, grid());
+  const auto found = compare(sharp, deep, grid());
   ASSERT_TRUE(found);
   EXPECT_EQ(found->sharper, 0);
   EXPECT_NEAR(found->blur, 1.5, 0.1);
@@ -81,13 +98,13 @@ TEST(Sharpness, ExposureDoesNotCount) {
 TEST(Sharpness, NoiseOfOneImageIsNone) {
   const cv::Mat image = grey_levels(scene());
   const cv::Mat noisy = grey_levels(displaced(scene()), 6);
-  EXPECT_FALSE(compare_sharpness(image, noisy, grid()));
-  EXPECT_FALSE(compare_sharpness(noisy, image, grid()));
+  EXPECT_FALSE(compare(image, noisy, grid()));
+  EXPECT_FALSE(compare(noisy, image, grid()));
 }
 
 TEST(Sharpness, NoisyImagesDifferToo) {
-  const auto found = compare_sharpness(grey_levels(scene(), 3),
-                                       grey_levels(displaced(blurred(scene(), 1.5))), grid());
+  const auto found =
+      compare(grey_levels(scene(), 3), grey_levels(displaced(blurred(scene(), 1.5))), grid());
   ASSERT_TRUE(found);
   EXPECT_EQ(found->sharper, 0);
   EXPECT_NEAR(found->blur, 1.5, 0.15);
@@ -96,25 +113,53 @@ TEST(Sharpness, NoisyImagesDifferToo) {
 TEST(Sharpness, FewFalseMatchesAreHarmless) {
   std::vector<PixelMatch> matches = grid();
   for (std::size_t i = 0; i < matches.size(); i += 4) matches[i].second = {size - 0.4, 0};
-  const auto found = compare_sharpness(grey_levels(scene()),
-                                       grey_levels(displaced(blurred(scene(), 1.5))), matches);
+  const auto found =
+      compare(grey_levels(scene()), grey_levels(displaced(blurred(scene(), 1.5))), matches);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->blur, 1.5, 0.2);
+}
+
+TEST(Sharpness, DetailOfAnotherSizeIsNone) {
+  // A camera of twice the focal length sees the middle of the scene at twice the size.
+  cv::Mat large;
+  cv::resize(grey_levels(scene()), large, {2 * size, 2 * size}, 0, 0, cv::INTER_LANCZOS4);
+  large = large(cv::Rect(size / 2, size / 2, size, size));
+  std::vector<PixelMatch> matches;
+  for (const PixelMatch& match : grid(7)) {
+    const Eigen::Vector2d there = 2 * match.first - Eigen::Vector2d::Constant(size / 2.);
+    if (there.minCoeff() >= 0 && there.maxCoeff() < size) matches.push_back({match.first, there});
+  }
+  ASSERT_GT(matches.size(), 200u);
+  const cv::Mat image = grey_levels(scene());
+  EXPECT_FALSE(compare_sharpness(view(), view(0, 360), image, large, matches));
+  EXPECT_TRUE(compare_sharpness(view(), view(), image, large, matches))
+      << "what a wrong calibration says: the test would see a difference";
+}
+
+TEST(Sharpness, MaskedFeaturesDoNotCount) {
+  View masked = view();
+  masked.mask = cv::Mat(size, size, CV_8UC1, cv::Scalar(255));
+  masked.mask.rowRange(0, size - 20) = 0;
+  const cv::Mat sharp = grey_levels(scene());
+  const cv::Mat blunt = grey_levels(displaced(blurred(scene(), 2)));
+  EXPECT_TRUE(compare_sharpness(view(), view(-0.1), sharp, blunt, grid()));
+  EXPECT_FALSE(compare_sharpness(masked, view(-0.1), sharp, blunt, grid()));
+  EXPECT_FALSE(compare_sharpness(view(), masked, sharp, blunt, grid()));
 }
 
 TEST(Sharpness, NothingIsSaidOfTooLittle) {
   const cv::Mat sharp = grey_levels(scene());
   const cv::Mat blunt = grey_levels(displaced(blurred(scene(), 2)));
-  EXPECT_FALSE(compare_sharpness(sharp, blunt, {}));
-  EXPECT_FALSE(compare_sharpness(sharp, blunt, grid(60)));
+  EXPECT_FALSE(compare(sharp, blunt, {}));
+  EXPECT_FALSE(compare(sharp, blunt, grid(60)));
   const cv::Mat flat(size, size, CV_8UC1, cv::Scalar(90));
-  EXPECT_FALSE(compare_sharpness(sharp, flat, grid()));
-  EXPECT_FALSE(compare_sharpness(flat, flat, grid()));
+  EXPECT_FALSE(compare(sharp, flat, grid()));
+  EXPECT_FALSE(compare(flat, flat, grid()));
 }
 
 TEST(Sharpness, OtherImagesAreRefused) {
   const cv::Mat sharp = grey_levels(scene());
-  EXPECT_NE(test::error_of([&] { compare_sharpness(sharp, {}, grid()); }).find("second image"),
+  EXPECT_NE(test::error_of([&] { compare(sharp, {}, grid()); }).find("second image"),
             std::string::npos);
 }
 
@@ -127,18 +172,22 @@ TEST(Sharpness, BlurOfNothingIsTheImage) {
 }
 
 TEST(Sharpness, OfRenderedPairs) {
-  const auto data = test::data_folder();
-  if (data.empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
   for (const char* set : {"desk_tumvi", "warehouse_expo", "street_forward_omni"}) {
     SCOPED_TRACE(set);
-    const cv::Mat left = read_image(data / "synthetic" / set / "cam0.png");
-    cv::Mat right = read_image(data / "synthetic" / set / "cam1.png");
-    EXPECT_FALSE(compare_sharpness(left, right, match_features(left, right)));
+    const auto folder = test::data_folder() / "synthetic" / set;
+    const cv::Mat left = read_image(folder / "cam0.png");
+    cv::Mat right = read_image(folder / "cam1.png");
+    const auto views = read_calibration(folder / "calib.yaml", left.size()).rig.views;
+    const auto difference = [&] {
+      return compare_sharpness(views[0], views[1], left, right, match_features(left, right));
+    };
+    EXPECT_FALSE(difference());
     right = blurred(right, 1.2);
-    const auto found = compare_sharpness(left, right, match_features(left, right));
+    const auto found = difference();
     ASSERT_TRUE(found);
     EXPECT_EQ(found->sharper, 0);
-    EXPECT_NEAR(found->blur, 1.2, 0.3);  // the second camera of the street is nearer
+    EXPECT_NEAR(found->blur, 1.2, 0.15);
   }
 }
 
