@@ -140,15 +140,16 @@ std::optional<SharpnessDifference> compare_sharpness(const View& first, const Vi
     in_sharp.push_back(pixel_of(match.first, sharp));
     in_blunt.push_back(pixel_of(match.second, blunt));
   }
+  std::vector<double> detail = detail_at(sharp, in_sharp);
   std::vector<double> target = detail_at(blunt, in_blunt);
-  const auto found = excess(detail_at(sharp, in_sharp), target);
+  const auto found = excess(detail, target);
   if (!found || std::abs(found->value) < certain * found->error) return std::nullopt;
   SharpnessDifference difference;
   if (found->value < 0) {
     difference.sharper = 1;
     std::swap(sharp, blunt);
     std::swap(in_sharp, in_blunt);
-    target = detail_at(blunt, in_blunt);
+    std::swap(detail, target);
   }
   double low = 0;
   double high = largest_blur;
