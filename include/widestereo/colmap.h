@@ -2,7 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "widestereo/rig.h"
@@ -26,23 +28,53 @@ struct CalibratedImages {
 /// .txt).
 bool is_colmap_model(const std::filesystem::path& path);
 
-/// Reads the calibration, poses and points of `images` from a COLMAP model, binary or text, and
-/// validates them. An image is the one whose name in the model is the end of its path (the longest
-/// such name where there are several); that is the view's name, too. The world frame and the unit
-/// of length are the reconstruction's: metres only where it was scaled to them. COLMAP's pixel
-/// centres, at half pixels, are moved to whole ones. Distances reach from 0.75 of the 1st to 1.25
-/// of the 99th percentile of those between the images and the points that they observe; they are
-/// missing where that is fewer than 20. Throws Error naming the file and the remedy, also for
-/// camera models that have no equivalent here (thin prisms, division, equirectangular).
-CalibratedImages read_colmap(const std::filesystem::path& folder,
-                             const std::vector<std::filesystem::path>& images);
+/// A reconstruction that COLMAP has written, binary or text. Images are numbered in the order of
+/// their names.
+class ColmapModel {
+ public:
+  /// Reads the whole model. Throws Error naming the file and the remedy.
+  explicit ColmapModel(const std::filesystem::path& folder);
+  ~ColmapModel();
+  ColmapModel(ColmapModel&&) noexcept;
+  ColmapModel& operator=(ColmapModel&&) noexcept;
 
-/// Files of at most `count` other images of the model to match `image` with, best first: those that
-/// observe most of its points, each of which counts by the angle between the two rays to it (most
-/// at 5 degrees: Yao et al., MVSNet, ECCV 2018, section 4.1). They lie in the folder of images that
-/// `image` lies in by its name. Fewer where fewer share points. Throws as read_colmap().
+  const std::vector<std::string>& names() const;
+
+  /// The image whose name is the end of a file's path; the longest such name where there are
+  /// several. Throws Error where there is none.
+  std::size_t image_of(const std::filesystem::path& file) const;
+
+  /// Calibration and poses of images, validated; views are named as the images are. The world frame
+  /// and the unit of length are the reconstruction's: metres only where it was scaled to them.
+  /// COLMAP's pixel centres, at half pixels, are moved to whole ones. Distances reach from 0.75 of
+  /// the 1st to 1.25 of the 99th percentile of those between the images and the points that they
+  /// observe; they are missing where that is fewer than 20. Throws Error, also for camera models
+  /// that have no equivalent here (thin prisms, division, equirectangular).
+  CalibratedImages calibrated(const std::vector<std::size_t>& images) const;
+
+  /// At most `count` other images to match `image` with, best first: those that observe most of its
+  /// points, each of which counts by the angle between the two rays to it (most at 5 degrees: Yao
+  /// et al., MVSNet, ECCV 2018, section 4.1). Fewer where fewer share points.
+  std::vector<std::size_t> sources(std::size_t image, std::size_t count) const;
+
+  /// Groups of at most `size` images to match with each other, which together hold every image. An
+  /// image of an earlier group is in another one, too, where it suits that much better than all
+  /// that have none yet. Images that share points with no other are groups of one.
+  std::vector<std::vector<std::size_t>> groups(std::size_t size) const;
+
+ private:
+  class Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// ColmapModel::calibrated() of the images of files.
+CalibratedImages read_colmap(const std::filesystem::path& folder,
+                             const std::vector<std::filesystem::path>& files);
+
+/// ColmapModel::sources() of the image of a file, as files of the folder of images that it lies in
+/// by its name.
 std::vector<std::filesystem::path> colmap_sources(const std::filesystem::path& folder,
-                                                  const std::filesystem::path& image,
+                                                  const std::filesystem::path& file,
                                                   std::size_t count);
 
 }  // namespace widestereo

@@ -29,7 +29,14 @@ constexpr double margin = 0.25;
 constexpr double best_angle = 5;
 constexpr double deviation_below = 1, deviation_above = 10;
 
-using Points = std::unordered_map<std::uint64_t, Eigen::Vector3d>;
+// What an image with a map already must promise more than one without, to be matched again.
+constexpr double worth_another_match = 2;
+
+/// What the model knows of a point.
+struct Point {
+  Eigen::Vector3d position;
+  std::vector<std::size_t> observers;  // in ascending order, each once
+};
 
 /// How many components `name` has where it is the end of `path`, else 0.
 std::size_t shared_end(const fs::path& path, const fs::path& name) {
@@ -68,36 +75,6 @@ double worth_of_angle(double degrees) {
   return std::exp(-0.5 * x * x);
 }
 
-/// The model's image for each file.
-std::vector<ColmapImage> images_of_files(const fs::path& folder,
-                                         const std::vector<fs::path>& files) {
-  std::vector<fs::path> paths;
-  for (const fs::path& file : files) paths.push_back(whole_path(file));
-  std::vector<ColmapImage> images(files.size());
-  std::vector<std::size_t> shared(files.size());
-  std::size_t count = 0;
-  std::string example;
-  const fs::path list = colmap_file(folder, "images");
-  calibration::each_colmap_image(list, [&](const ColmapImage& image) {
-    if (count++ == 0) example = image.name;
-    const fs::path name = fs::path(image.name).lexically_normal();
-    for (std::size_t i = 0; i < files.size(); ++i) {
-      const std::size_t components = shared_end(paths[i], name);
-      if (components <= shared[i]) continue;
-      shared[i] = components;
-      images[i] = image;
-    }
-  });
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (shared[i] > 0) continue;
-    throw Error(list.string() + " has no image whose name is the end of " + files[i].string() +
-                " among its " + std::to_string(count) +
-                (count > 0 ? " (the first is " + example + ")" : "") +
-                "; give images that COLMAP has registered, in their folder.");
-  }
-  return images;
-}
-
 std::map<std::uint64_t, ColmapCamera> cameras_of(const fs::path& file) {
   std::map<std::uint64_t, ColmapCamera> cameras;
   calibration::each_colmap_camera(
@@ -105,33 +82,13 @@ std::map<std::uint64_t, ColmapCamera> cameras_of(const fs::path& file) {
   return cameras;
 }
 
-/// The points that images observe; none where the model has no file of points.
-Points points_of(const fs::path& folder, const std::vector<ColmapImage>& images) {
-  Points points;
-  const fs::path file = colmap_file(folder, "points3D");
-  if (file.empty()) return points;
-  std::unordered_set<std::uint64_t> observed;
-  for (const ColmapImage& image : images) observed.insert(image.points.begin(), image.points.end());
-  calibration::each_colmap_point(file, [&](std::uint64_t number, const Eigen::Vector3d& position) {
-    if (observed.contains(number)) points.emplace(number, position);
-  });
-  return points;
-}
-
-std::optional<DistanceRange> distances_of(const std::vector<ColmapImage>& images,
-                                          const Points& points) {
-  std::vector<double> distances;
-  for (const ColmapImage& image : images) {
-    for (const std::uint64_t number : image.points) {
-      const auto point = points.find(number);
-      if (point == points.end()) continue;
-      const double distance = (image.camera_from_world * point->second).norm();
-      if (std::isfinite(distance)) distances.push_back(distance);
-    }
-  }
-  if (distances.size() < fewest_points) return std::nullopt;
-  return DistanceRange{.nearest = (1 - margin) * percentile(distances, outliers),
-                       .farthest = (1 + margin) * percentile(distances, 1 - outliers)};
+std::vector<ColmapImage> images_of(const fs::path& file) {
+  std::vector<ColmapImage> images;
+  calibration::each_colmap_image(file,
+                                 [&](ColmapImage image) { images.push_back(std::move(image)); });
+  std::stable_sort(images.begin(), images.end(),
+                   [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
+  return images;
 }
 
 }  // namespace
@@ -140,54 +97,207 @@ bool is_colmap_model(const fs::path& path) {
   return !colmap_file(path, "cameras").empty() && !colmap_file(path, "images").empty();
 }
 
-CalibratedImages read_colmap(const fs::path& folder, const std::vector<fs::path>& files) {
-  require_model(folder);
-  const fs::path cameras_file = colmap_file(folder, "cameras");
-  const auto cameras = cameras_of(cameras_file);
-  const std::vector<ColmapImage> images = images_of_files(folder, files);
-  CalibratedImages calibrated;
-  calibrated.in_metres = false;
-  for (const ColmapImage& image : images) {
-    const auto camera = cameras.find(image.camera);
-    if (camera == cameras.end()) {
-      throw Error(cameras_file.string() + " has no camera " + std::to_string(image.camera) +
-                  ", which took " + image.name + "; is the model complete?");
-    }
-    View& view = calibrated.rig.views.emplace_back();
-    view.name = image.name;
-    view.camera = camera_of(camera->second, cameras_file.string());
-    view.world_from_camera = image.camera_from_world.inverse();
+class ColmapModel::Implementation {
+ public:
+  explicit Implementation(const fs::path& folder) : folder_(folder) {
+    require_model(folder);
+    cameras_file_ = colmap_file(folder, "cameras");
+    images_file_ = colmap_file(folder, "images");
+    cameras_ = cameras_of(cameras_file_);
+    images_ = images_of(images_file_);
+    for (const ColmapImage& image : images_) names_.push_back(image.name);
+    read_points();
   }
-  validate(calibrated.rig, folder.string());
-  calibrated.distances = distances_of(images, points_of(folder, images));
-  return calibrated;
+
+  const std::vector<std::string>& names() const { return names_; }
+
+  std::size_t image_of(const fs::path& file) const {
+    const fs::path path = whole_path(file);
+    std::size_t longest = 0, found = 0;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      const std::size_t components = shared_end(path, fs::path(names_[i]).lexically_normal());
+      if (components <= longest) continue;
+      longest = components;
+      found = i;
+    }
+    if (longest > 0) return found;
+    throw Error(images_file_.string() + " has no image whose name is the end of " + file.string() +
+                " among its " + std::to_string(names_.size()) +
+                (names_.empty() ? "" : " (the first is " + names_.front() + ")") +
+                "; give images that COLMAP has registered, in their folder.");
+  }
+
+  CalibratedImages calibrated(const std::vector<std::size_t>& images) const {
+    CalibratedImages calibrated;
+    calibrated.in_metres = false;
+    for (const std::size_t number : images) {
+      const ColmapImage& image = images_.at(number);
+      const auto camera = cameras_.find(image.camera);
+      if (camera == cameras_.end()) {
+        throw Error(cameras_file_.string() + " has no camera " + std::to_string(image.camera) +
+                    ", which took " + image.name + "; is the model complete?");
+      }
+      View& view = calibrated.rig.views.emplace_back();
+      view.name = image.name;
+      view.camera = camera_of(camera->second, cameras_file_.string());
+      view.world_from_camera = image.camera_from_world.inverse();
+    }
+    validate(calibrated.rig, folder_.string());
+    calibrated.distances = distances_of(images);
+    return calibrated;
+  }
+
+  std::vector<std::size_t> sources(std::size_t image, std::size_t count) const {
+    std::vector<std::pair<double, std::size_t>> ranked;
+    for (const auto& [other, worth] : worth_of_others(image)) ranked.emplace_back(-worth, other);
+    std::sort(ranked.begin(), ranked.end());
+    std::vector<std::size_t> sources;
+    for (std::size_t i = 0; i < std::min(count, ranked.size()); ++i) {
+      sources.push_back(ranked[i].second);
+    }
+    return sources;
+  }
+
+  std::vector<std::vector<std::size_t>> groups(std::size_t size) const {
+    std::vector<std::vector<std::size_t>> groups;
+    std::vector<bool> in_a_group(images_.size());
+    for (std::size_t first = 0; first < images_.size(); ++first) {
+      if (in_a_group[first]) continue;
+      std::vector<std::size_t> group = {first};
+      Worths worths = worth_of_others(first);
+      while (group.size() < size && !worths.empty()) {
+        group.push_back(next_member(worths, in_a_group));
+        worths = least_of(worths, worth_of_others(group.back()));
+      }
+      for (const std::size_t image : group) in_a_group[image] = true;
+      groups.push_back(std::move(group));
+    }
+    return groups;
+  }
+
+ private:
+  /// What matching with other images promises; those that promise nothing are missing.
+  using Worths = std::map<std::size_t, double>;
+
+  void read_points() {
+    const fs::path file = colmap_file(folder_, "points3D");
+    if (file.empty()) return;
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      for (const std::uint64_t number : images_[i].points) {
+        std::vector<std::size_t>& observers = points_[number].observers;
+        if (observers.empty() || observers.back() != i) observers.push_back(i);
+      }
+    }
+    std::unordered_map<std::uint64_t, Point> known;
+    calibration::each_colmap_point(
+        file, [&](std::uint64_t number, const Eigen::Vector3d& position) {
+          const auto point = points_.find(number);
+          if (point == points_.end()) return;
+          known.emplace(number, Point{position, std::move(point->second.observers)});
+        });
+    points_ = std::move(known);
+  }
+
+  std::optional<DistanceRange> distances_of(const std::vector<std::size_t>& images) const {
+    std::vector<double> distances;
+    for (const std::size_t number : images) {
+      const ColmapImage& image = images_[number];
+      for (const std::uint64_t observed : image.points) {
+        const auto point = points_.find(observed);
+        if (point == points_.end()) continue;
+        const double distance = (image.camera_from_world * point->second.position).norm();
+        if (std::isfinite(distance)) distances.push_back(distance);
+      }
+    }
+    if (distances.size() < fewest_points) return std::nullopt;
+    return DistanceRange{.nearest = (1 - margin) * percentile(distances, outliers),
+                         .farthest = (1 + margin) * percentile(distances, 1 - outliers)};
+  }
+
+  Worths worth_of_others(std::size_t number) const {
+    Worths worths;
+    const ColmapImage& image = images_.at(number);
+    const Eigen::Vector3d centre = centre_of(image);
+    const std::unordered_set<std::uint64_t> observed(image.points.begin(), image.points.end());
+    for (const std::uint64_t seen : observed) {
+      const auto point = points_.find(seen);
+      if (point == points_.end()) continue;
+      const Eigen::Vector3d& position = point->second.position;
+      for (const std::size_t other : point->second.observers) {
+        if (other == number) continue;
+        const Eigen::Vector3d from_other = position - centre_of(images_[other]);
+        worths[other] += worth_of_angle(degrees_between(position - centre, from_other));
+      }
+    }
+    std::erase_if(worths, [](const auto& worth) { return !(worth.second > 0); });
+    return worths;
+  }
+
+  /// What images promise to the member that they promise least.
+  static Worths least_of(const Worths& a, const Worths& b) {
+    Worths least;
+    for (const auto& [image, worth] : a) {
+      const auto other = b.find(image);
+      if (other != b.end()) least.emplace(image, std::min(worth, other->second));
+    }
+    return least;
+  }
+
+  static std::size_t next_member(const Worths& worths, const std::vector<bool>& in_a_group) {
+    const auto worth = [&](const Worths::value_type& image) {
+      return in_a_group[image.first] ? image.second / worth_another_match : image.second;
+    };
+    return std::max_element(worths.begin(), worths.end(),
+                            [&](const auto& a, const auto& b) { return worth(a) < worth(b); })
+        ->first;
+  }
+
+  fs::path folder_, cameras_file_, images_file_;
+  std::map<std::uint64_t, ColmapCamera> cameras_;
+  std::vector<ColmapImage> images_;  // in the order of names
+  std::vector<std::string> names_;
+  std::unordered_map<std::uint64_t, Point> points_;
+};
+
+ColmapModel::ColmapModel(const fs::path& folder)
+    : implementation_(std::make_unique<Implementation>(folder)) {}
+ColmapModel::~ColmapModel() = default;
+ColmapModel::ColmapModel(ColmapModel&&) noexcept = default;
+ColmapModel& ColmapModel::operator=(ColmapModel&&) noexcept = default;
+
+const std::vector<std::string>& ColmapModel::names() const { return implementation_->names(); }
+
+std::size_t ColmapModel::image_of(const fs::path& file) const {
+  return implementation_->image_of(file);
+}
+
+CalibratedImages ColmapModel::calibrated(const std::vector<std::size_t>& images) const {
+  return implementation_->calibrated(images);
+}
+
+std::vector<std::size_t> ColmapModel::sources(std::size_t image, std::size_t count) const {
+  return implementation_->sources(image, count);
+}
+
+std::vector<std::vector<std::size_t>> ColmapModel::groups(std::size_t size) const {
+  return implementation_->groups(size);
+}
+
+CalibratedImages read_colmap(const fs::path& folder, const std::vector<fs::path>& files) {
+  const ColmapModel model(folder);
+  std::vector<std::size_t> images;
+  for (const fs::path& file : files) images.push_back(model.image_of(file));
+  return model.calibrated(images);
 }
 
 std::vector<fs::path> colmap_sources(const fs::path& folder, const fs::path& file,
                                      std::size_t count) {
-  require_model(folder);
-  const std::vector<ColmapImage> reference = images_of_files(folder, {file});
-  const ColmapImage& image = reference.front();
-  const Points points = points_of(folder, reference);
-  const Eigen::Vector3d centre = centre_of(image);
-  std::vector<std::pair<double, std::string>> ranked;
-  calibration::each_colmap_image(colmap_file(folder, "images"), [&](const ColmapImage& other) {
-    if (other.name == image.name) return;
-    const Eigen::Vector3d other_centre = centre_of(other);
-    double score = 0;
-    for (const std::uint64_t number : other.points) {
-      const auto point = points.find(number);
-      if (point == points.end()) continue;
-      score +=
-          worth_of_angle(degrees_between(point->second - centre, point->second - other_centre));
-    }
-    if (score > 0) ranked.emplace_back(-score, other.name);
-  });
-  std::sort(ranked.begin(), ranked.end());
-  const fs::path images = folder_of_images(file, image.name);
+  const ColmapModel model(folder);
+  const std::size_t image = model.image_of(file);
+  const fs::path images = folder_of_images(file, model.names()[image]);
   std::vector<fs::path> sources;
-  for (std::size_t i = 0; i < std::min(count, ranked.size()); ++i) {
-    sources.push_back(images / ranked[i].second);
+  for (const std::size_t source : model.sources(image, count)) {
+    sources.push_back(images / model.names()[source]);
   }
   return sources;
 }

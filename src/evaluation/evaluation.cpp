@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/angle.h"
+#include "geometry/distance.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -35,8 +36,6 @@ struct Sample {
   double confidence = 0;
   cv::Point pixel;
 };
-
-bool has_distance(float distance) { return distance > 0 && std::isfinite(distance); }
 
 void require_size(const cv::Mat& map, cv::Size size, int type, const char* what) {
   if (map.empty() || (map.size() == size && map.type() == type)) return;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "geometry/distance.h"
 #include "widestereo/evaluation.h"
 
 namespace widestereo {
@@ -139,11 +140,11 @@ cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
     for (int x = 0; x < distance.cols; ++x) {
       const float gt = truth.distance.at<float>(y, x);
       const bool scored =
-          gt > 0 && std::isfinite(gt) && (truth.valid.empty() || truth.valid.at<uchar>(y, x) != 0);
+          has_distance(gt) && (truth.valid.empty() || truth.valid.at<uchar>(y, x) != 0);
       if (!scored) continue;
       const float d = distance.at<float>(y, x);
       cv::Vec3d colour(200, 60, 30);
-      if (d > 0 && std::isfinite(d)) {
+      if (has_distance(d)) {
         // Logarithmic from 0.5 % (green) over 1.6 % (yellow) to 5 % (red).
         const double relative = std::abs(static_cast<double>(d) / static_cast<double>(gt) - 1);
         const double t = std::clamp(std::log10(std::max(relative, 1e-6) / 0.005), 0.0, 1.0);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/distance.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -46,8 +47,7 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
       const double d = distance.at<float>(y, x);
       Eigen::Vector3d ray;
       Eigen::Vector2d u;
-      if (!(d > 0 && std::isfinite(d)) || is_masked(view, {x, y}) ||
-          !unproject(view.camera, {x, y}, ray))
+      if (!has_distance(d) || is_masked(view, {x, y}) || !unproject(view.camera, {x, y}, ray))
         continue;
       const Eigen::Vector3d point = motion * (d * ray);
       if (!project(other.camera, point, u) || u.x() < 0 || u.y() < 0 ||
@@ -98,7 +98,7 @@ SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       const float d = distance.at<float>(y, x);
-      with_distance += d > 0 && std::isfinite(d) ? 1 : 0;
+      with_distance += has_distance(d) ? 1 : 0;
       if (synthesised.visible.at<uchar>(y, x) == 0) continue;
       ++visible;
       const double n = share.at<double>(y, x);

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/distance.h"
 #include "statistics/percentile.h"
 
 namespace widestereo {
@@ -107,7 +108,7 @@ cv::Mat as_bgr8(const cv::Mat& image) {
 ColourRange robust_range(const cv::Mat& distance) {
   std::vector<float> inverse;
   for (auto it = distance.begin<float>(); it != distance.end<float>(); ++it) {
-    if (*it > 0 && std::isfinite(*it)) inverse.push_back(1 / *it);
+    if (has_distance(*it)) inverse.push_back(1 / *it);
   }
   if (inverse.empty()) return {1, 10};
   const double low = static_cast<double>(percentile(inverse, 0.02));

@@ -2,11 +2,11 @@
 #include "widestereo/point_cloud.h"
 
 #include <bit>
-#include <cmath>
 #include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/distance.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -48,7 +48,7 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
   for (int y = 0; y < distance.rows; ++y) {
     for (int x = 0; x < distance.cols; ++x) {
       const float d = distance.at<float>(y, x);
-      if (!(d > 0) || !std::isfinite(d)) continue;
+      if (!has_distance(d)) continue;
       const cv::Vec4f& ray = rays.at<cv::Vec4f>(y, x);
       CloudPoint point{world * Eigen::Vector3f(d * ray[0], d * ray[1], d * ray[2]),
                        Eigen::Vector3f::Zero(),
@@ -86,7 +86,8 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
   }
   write_atomically(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);
-    file << "ply\nformat binary_little_endian 1.0\ncomment world frame, metres\n"
+    file << "ply\nformat binary_little_endian 1.0\n"
+         << "comment world frame and unit of the calibration\n"
          << "element vertex " << cloud.size() << "\n"
          << "property float x\nproperty float y\nproperty float z\n"
          << "property float nx\nproperty float ny\nproperty float nz\n"

@@ -230,6 +230,39 @@ TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {
             std::string::npos);
 }
 
+/// Images of one set of points each, 10 in front of them, 0.9 apart; out of the order of names.
+TEST_F(Colmap, GroupsAreOfImagesThatSeeTheSame) {
+  std::string images, points;
+  const auto add = [&](const std::string& name, double x, int first_point) {
+    static int number = 0;
+    images += std::to_string(++number) + " 1 0 0 0 " + std::to_string(-x) + " 0 0 1 " + name + "\n";
+    for (int i = first_point; i < first_point + 30; ++i) images += "1 2 " + std::to_string(i) + " ";
+    images += "\n";
+  };
+  for (int i = 0; i < 90; ++i) points += std::to_string(i) + " 0 0 10 9 9 9 0.5 1 1\n";
+  add("f", 1.8, 30);
+  add("a", 0, 0);
+  add("b", 0, 30);
+  add("c", 0.9, 0);
+  add("d", 0.9, 30);
+  add("e", 1.8, 0);
+  add("g", -0.9, 30);
+  add("h", 0, 60);
+  write_text(cameras_text, images);
+  folder_.write("points3D.txt", points);
+  const ColmapModel model(folder_.path());
+  EXPECT_EQ(model.names(), (std::vector<std::string>{"a", "b", "c", "d", "e", "f", "g", "h"}));
+  using Groups = std::vector<std::vector<std::size_t>>;
+  // b has d and g at 5.1 degrees, f at 10.2; d has f at 5.1 and g at 10.3. g, which is left, is
+  // joined by those that were matched before.
+  EXPECT_EQ(model.groups(3), (Groups{{0, 2, 4}, {1, 3, 5}, {6, 1, 3}, {7}}));
+  // e has no other image left; f has g at 15.4 degrees, worth more than half of d at 5.1.
+  EXPECT_EQ(model.groups(2), (Groups{{0, 2}, {1, 3}, {4, 2}, {5, 6}, {7}}));
+  EXPECT_EQ(model.groups(8), (Groups{{0, 2, 4}, {1, 3, 5, 6}, {7}}));
+  fs::remove(folder_.path() / "points3D.txt");
+  EXPECT_EQ(ColmapModel(folder_.path()).groups(3).size(), 8U);
+}
+
 TEST_F(Colmap, ReadsBinaryPoints) {
   write_binary(
       cameras_binary(), bytes(std::uint64_t{1}) + bytes(std::uint32_t{4}) +
@@ -312,7 +345,7 @@ TEST_F(Colmap, MissingPartsAreErrors) {
   EXPECT_TRUE(is_colmap_model(folder_.path()));
   EXPECT_NE(error({"left/c.png"})
                 .find("has no image whose name is the end of left/c.png among "
-                      "its 3 (the first is left/a b.png)"),
+                      "its 3 (the first is b.png)"),
             std::string::npos)
       << error({"left/c.png"});
   EXPECT_NE(error({"b.png", "b.png"}).find("have the same centre"), std::string::npos);

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/fusion.h"
+
+#include <atomic>
+#include <cmath>
+#include <list>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "geometry/angle.h"
+#include "geometry/distance.h"
+#include "widestereo/error.h"
+
+namespace widestereo {
+namespace {
+
+constexpr int no_point = -1;
+
+/// The points of one view.
+struct ViewCloud {
+  PointCloud points;
+  cv::Mat index;  ///< CV_32SC1: of each pixel's point, or no_point
+
+  std::size_t bytes() const {
+    return points.capacity() * sizeof(CloudPoint) + index.total() * index.elemSize();
+  }
+};
+
+ViewCloud cloud_of(const View& view, const ViewMaps& maps) {
+  require_calibrated_size(maps.distance, view, "The distances of " + view.name);
+  ViewCloud cloud;
+  const cv::Mat rays = ray_image(view.camera, view.mask);
+  cloud.points = make_point_cloud(maps.distance, rays, maps.normals, maps.image, maps.confidence,
+                                  view.world_from_camera);
+  cloud.points.shrink_to_fit();
+  cloud.index.create(maps.distance.size(), CV_32SC1);
+  int count = 0;
+  for (int y = 0; y < cloud.index.rows; ++y) {
+    for (int x = 0; x < cloud.index.cols; ++x) {
+      cloud.index.at<int>(y, x) = has_distance(maps.distance.at<float>(y, x)) ? count++ : no_point;
+    }
+  }
+  return cloud;
+}
+
+/// The clouds that were used last, as far as the memory allowed for them goes.
+class CloudCache {
+ public:
+  using Cloud = std::shared_ptr<const ViewCloud>;
+
+  CloudCache(const std::vector<View>& views, const MapsOfView& maps, std::size_t bytes)
+      : views_(views), maps_(maps), most_bytes_(bytes) {}
+
+  Cloud get(std::size_t view) {
+    for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
+      if (entry->first != view) continue;
+      entries_.splice(entries_.begin(), entries_, entry);
+      return entries_.front().second;
+    }
+    Cloud cloud = std::make_shared<const ViewCloud>(cloud_of(views_[view], maps_(view)));
+    bytes_ += cloud->bytes();
+    entries_.emplace_front(view, cloud);
+    while (bytes_ > most_bytes_ && entries_.size() > 1) {
+      bytes_ -= entries_.back().second->bytes();
+      entries_.pop_back();
+    }
+    return cloud;
+  }
+
+ private:
+  const std::vector<View>& views_;
+  const MapsOfView& maps_;
+  std::size_t most_bytes_;
+  std::size_t bytes_ = 0;
+  std::list<std::pair<std::size_t, Cloud>> entries_;  // the last used one first
+};
+
+/// The mean of what views see of one point.
+class Mean {
+ public:
+  void add(const CloudPoint& point, double distance) {
+    const double weight = 1 / (distance * distance);
+    weights_ += weight;
+    position_ += weight * point.position.cast<double>();
+    normal_ += weight * point.normal.cast<double>();
+    colour_ += weight * Eigen::Vector3d(point.red, point.green, point.blue);
+    confidence_ = std::max(confidence_, point.confidence);
+    ++count_;
+  }
+  int count() const { return count_; }
+  CloudPoint point() const {
+    const auto level = [this](int i) {
+      return static_cast<std::uint8_t>(std::lround(colour_[i] / weights_));
+    };
+    return {(position_ / weights_).cast<float>(),
+            normal_.normalized().cast<float>(),
+            level(0),
+            level(1),
+            level(2),
+            confidence_};
+  }
+
+ private:
+  double weights_ = 0;
+  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d colour_ = Eigen::Vector3d::Zero();
+  float confidence_ = 0;
+  int count_ = 0;
+};
+
+/// A view beside the one whose pixels are taken.
+struct Neighbour {
+  std::size_t number;
+  const View* view;
+  Eigen::Isometry3d camera_from_world;
+  CloudCache::Cloud cloud;
+};
+
+class Fusion {
+ public:
+  Fusion(const std::vector<View>& views, const MapsOfView& maps, const FusionOptions& options)
+      : views_(views), options_(options), clouds_(views, maps, options.cache_bytes) {
+    for (const View& view : views) {
+      used_.emplace_back(static_cast<std::size_t>(view.camera.width) *
+                         static_cast<std::size_t>(view.camera.height));
+    }
+  }
+
+  void add(std::size_t number, const std::vector<std::size_t>& others) {
+    const Neighbour self = neighbour(number);
+    std::vector<Neighbour> neighbours;
+    for (const std::size_t other : others) {
+      if (other != number) neighbours.push_back(neighbour(other));
+    }
+    const cv::Mat& index = self.cloud->index;
+    std::vector<PointCloud> rows(static_cast<std::size_t>(index.rows));
+    cv::parallel_for_(cv::Range(0, index.rows), [&](const cv::Range& range) {
+      for (int y = range.start; y < range.end; ++y) {
+        add_row(y, self, neighbours, rows[static_cast<std::size_t>(y)]);
+      }
+    });
+    for (const PointCloud& row : rows) points_.insert(points_.end(), row.begin(), row.end());
+  }
+
+  PointCloud take() { return std::move(points_); }
+
+ private:
+  Neighbour neighbour(std::size_t number) {
+    const View& view = views_[number];
+    return {number, &view, view.world_from_camera.inverse(), clouds_.get(number)};
+  }
+
+  std::uint8_t& used(const Neighbour& view, int x, int y) {
+    return used_[view.number][static_cast<std::size_t>(y) * view.cloud->index.cols + x];
+  }
+
+  void add_row(int y, const Neighbour& self, const std::vector<Neighbour>& neighbours,
+               PointCloud& row) {
+    // Only views that come later look at what is marked here, so that rows may be taken at once.
+    std::vector<std::uint8_t*> joined;
+    for (int x = 0; x < self.cloud->index.cols; ++x) {
+      const int index = self.cloud->index.at<int>(y, x);
+      if (index == no_point || used(self, x, y)) continue;
+      const CloudPoint& point = self.cloud->points[static_cast<std::size_t>(index)];
+      Mean mean;
+      mean.add(point, distance_from(self, point));
+      joined.clear();
+      for (const Neighbour& other : neighbours) join({x, y}, point, self, other, mean, joined);
+      if (mean.count() < options_.min_views) continue;
+      row.push_back(mean.point());
+      for (std::uint8_t* mark : joined) {
+        std::atomic_ref(*mark).store(1, std::memory_order_relaxed);
+      }
+    }
+  }
+
+  void join(const cv::Point& pixel, const CloudPoint& point, const Neighbour& self,
+            const Neighbour& other, Mean& mean, std::vector<std::uint8_t*>& joined) {
+    Eigen::Vector2d position;
+    const Eigen::Vector3d seen = other.camera_from_world * point.position.cast<double>();
+    if (!project(other.view->camera, seen, position)) return;
+    const cv::Mat& index = other.cloud->index;
+    const double column = std::round(position.x()), line = std::round(position.y());
+    if (!(column >= 0 && line >= 0 && column < index.cols && line < index.rows)) return;
+    const int x = static_cast<int>(column), y = static_cast<int>(line);
+    const int found = index.at<int>(y, x);
+    if (found == no_point) return;
+    const CloudPoint& candidate = other.cloud->points[static_cast<std::size_t>(found)];
+    if (std::abs(distance_towards(point, candidate, other) / seen.norm() - 1) >
+        options_.max_relative) {
+      return;
+    }
+    const Eigen::Vector3d back = self.camera_from_world * candidate.position.cast<double>();
+    if (!project(self.view->camera, back, position)) return;
+    if ((position - Eigen::Vector2d(pixel.x, pixel.y)).norm() > options_.max_pixels) return;
+    const Eigen::Vector3d a = point.normal.cast<double>(), b = candidate.normal.cast<double>();
+    if (degrees_between(a, b) > options_.max_normal_angle) return;
+    mean.add(candidate, distance_from(other, candidate));
+    joined.push_back(&used(other, x, y));
+  }
+
+  /// How far from the view the plane of a point of its is on the ray to another point: pixels that
+  /// are half a pixel apart differ on oblique surfaces.
+  static double distance_towards(const CloudPoint& other, const CloudPoint& point,
+                                 const Neighbour& view) {
+    const Eigen::Vector3d centre = view.view->world_from_camera.translation();
+    const Eigen::Vector3d from_centre = point.position.cast<double>() - centre;
+    const Eigen::Vector3d ray = (other.position.cast<double>() - centre).normalized();
+    const Eigen::Vector3d normal = point.normal.cast<double>();
+    const double along = normal.dot(ray);
+    return along == 0 ? from_centre.norm() : normal.dot(from_centre) / along;
+  }
+
+  static double distance_from(const Neighbour& view, const CloudPoint& point) {
+    return (view.camera_from_world * point.position.cast<double>()).norm();
+  }
+
+  const std::vector<View>& views_;
+  const FusionOptions& options_;
+  CloudCache clouds_;
+  std::vector<std::vector<std::uint8_t>> used_;  // of each view, row by row
+  PointCloud points_;
+};
+
+}  // namespace
+
+PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
+                const MapsOfView& maps, const FusionOptions& options,
+                const std::function<void(double)>& progress) {
+  if (others.size() != views.size()) {
+    throw Error("Fusion needs one list of other views for each of the " +
+                std::to_string(views.size()) + " views, not " + std::to_string(others.size()) +
+                ".");
+  }
+  Fusion fusion(views, maps, options);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    fusion.add(i, others[i]);
+    if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(views.size()));
+  }
+  return fusion.take();
+}
+
+}  // namespace widestereo

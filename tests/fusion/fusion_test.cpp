@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/fusion.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "error_of.h"
+#include "widestereo/synthesis.h"
+
+namespace widestereo {
+namespace {
+
+constexpr int side = 64;
+// {X : normal . X = offset}, metres.
+const Eigen::Vector3d plane_normal = Eigen::Vector3d(0.2, -0.1, 1).normalized();
+constexpr double plane_offset = 2;
+
+double from_plane(const CloudPoint& point) {
+  return plane_normal.dot(point.position.cast<double>()) - plane_offset;
+}
+
+/// Three fisheye views side by side with the true maps of a plane.
+class Fusion : public ::testing::Test {
+ protected:
+  Fusion() {
+    Rig rig = render_demo(side).rig;
+    rig.views.push_back(rig.views[1]);
+    rig.views[2].world_from_camera.translation() *= 2;
+    const RenderedPair scene = render_plane(rig, plane_normal, plane_offset);
+    for (std::size_t i = 0; i < 3; ++i) {
+      views_.push_back(scene.rig.views[i]);
+      const RenderedView& rendered = scene.views[i];
+      maps_.push_back({.distance = rendered.truth.distance.clone(),
+                       .normals = rendered.truth.normals.clone(),
+                       .image = rendered.image,
+                       .confidence = cv::Mat(side, side, CV_32FC1,
+                                             cv::Scalar(0.5 + 0.1 * static_cast<double>(i)))});
+    }
+  }
+  PointCloud fuse_all(const FusionOptions& options = {}) {
+    return fuse(
+        views_, {{1, 2}, {0, 2}, {0, 1}}, [this](std::size_t i) { return maps_[i]; }, options);
+  }
+  std::size_t pixels_with_distance() const {
+    int count = 0;
+    for (const ViewMaps& maps : maps_) count += cv::countNonZero(maps.distance > 0);
+    return static_cast<std::size_t>(count);
+  }
+
+  std::vector<View> views_;
+  std::vector<ViewMaps> maps_;
+};
+
+TEST_F(Fusion, ViewsOfOneSurfaceBecomeOneLayerOfPointsOnIt) {
+  const PointCloud cloud = fuse_all();
+  // Views see nearly the same: little more points than one of them has pixels.
+  const int one = cv::countNonZero(maps_[0].distance > 0);
+  EXPECT_GT(cloud.size(), 0.9 * one);
+  EXPECT_LT(cloud.size(), 1.5 * one);
+  double largest = 0;
+  for (const CloudPoint& point : cloud) {
+    // Near the rim planes are far and oblique; pixels differ by half of one there.
+    const double distance = point.position.norm();
+    if (distance > 5) continue;
+    largest = std::max(largest, std::abs(from_plane(point)) / distance);
+    EXPECT_NEAR(std::abs(point.normal.cast<double>().dot(plane_normal)), 1, 1e-5);
+    EXPECT_GE(point.confidence, 0.6F);  // the surest of two views at least
+  }
+  EXPECT_LT(largest, 1e-5);
+}
+
+TEST_F(Fusion, PointsOfOneViewAloneNeedToBeAskedFor) {
+  maps_[1].distance = maps_[2].distance = cv::Mat::zeros(side, side, CV_32FC1);
+  EXPECT_TRUE(fuse_all().empty());
+  FusionOptions options;
+  options.min_views = 1;
+  EXPECT_EQ(fuse_all(options).size(), pixels_with_distance());
+  options.min_views = 3;
+  EXPECT_TRUE(fuse_all(options).empty());
+}
+
+TEST_F(Fusion, WhatAgreesWithNoOtherViewIsLeftOut) {
+  const cv::Rect patch(24, 24, 16, 16);
+  maps_[0].distance(patch) *= 0.9;
+  for (const CloudPoint& point : fuse_all()) {
+    if (point.position.norm() < 5) {
+      EXPECT_LT(std::abs(from_plane(point)), 0.03);
+    }
+  }
+  FusionOptions options;
+  options.min_views = 1;
+  const auto off = [](const PointCloud& cloud) {
+    return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
+      return point.position.norm() < 5 && std::abs(from_plane(point)) > 0.1;
+    });
+  };
+  EXPECT_EQ(off(fuse_all(options)), patch.area());
+}
+
+TEST_F(Fusion, NoiseIsAveraged) {
+  cv::RNG random(3);
+  for (ViewMaps& maps : maps_) {
+    cv::Mat noise(side, side, CV_32FC1);
+    random.fill(noise, cv::RNG::NORMAL, 1, 0.002);
+    maps.distance = maps.distance.mul(noise);
+  }
+  const auto deviation = [](const PointCloud& cloud) {
+    double sum = 0;
+    int count = 0;
+    for (const CloudPoint& point : cloud) {
+      if (point.position.norm() > 3) continue;
+      sum += from_plane(point) * from_plane(point);
+      ++count;
+    }
+    return std::sqrt(sum / count);
+  };
+  FusionOptions alone, three;
+  alone.min_views = 1;
+  alone.max_relative = 0;
+  three.min_views = 3;
+  // Three independent measurements.
+  EXPECT_NEAR(deviation(fuse_all(three)) / deviation(fuse_all(alone)), 1 / std::sqrt(3), 0.08);
+}
+
+TEST_F(Fusion, SurfacesSeenFromTheirTwoSidesStayApart) {
+  for (int i : {1, 2}) maps_[i].normals *= -1;
+  FusionOptions options;
+  options.min_views = 3;
+  EXPECT_TRUE(fuse_all(options).empty());
+  options.max_normal_angle = 180;
+  EXPECT_FALSE(fuse_all(options).empty());
+}
+
+/// Of a wall 2 m ahead of one view and 1 m ahead of the other, the nearer one knows four times as
+/// much.
+TEST_F(Fusion, NearViewsCountMore) {
+  Rig rig = render_demo(side).rig;
+  rig.views[0].world_from_camera.setIdentity();
+  rig.views[1].world_from_camera = Eigen::Translation3d(0, 0, 1);
+  const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    views_[i] = scene.rig.views[i];
+    maps_[i] = {.distance = scene.views[i].truth.distance.clone(),
+                .normals = {},
+                .image = cv::Mat(side, side, CV_8UC3, cv::Scalar(0, 0, i == 0 ? 200 : 0)),
+                .confidence = {}};
+  }
+  const cv::Mat distance = 1.004 * maps_[0].distance;
+  const cv::Rect middle(side / 2 - 1, side / 2 - 1, 2, 2);
+  maps_[0].distance = cv::Mat::zeros(side, side, CV_32FC1);
+  distance(middle).copyTo(maps_[0].distance(middle));
+  const PointCloud cloud =
+      fuse({views_[0], views_[1]}, {{1}, {}}, [this](std::size_t i) { return maps_[i]; });
+  ASSERT_EQ(cloud.size(), static_cast<std::size_t>(middle.area()));
+  for (const CloudPoint& point : cloud) {
+    EXPECT_NEAR(point.red, 200 / 5.0, 2);
+    EXPECT_NEAR(point.position.z(), 2 * (1 + 0.004 / 5), 2e-4);
+  }
+}
+
+TEST_F(Fusion, MemoryLimitsChangeTimeOnly) {
+  int loads = 0;
+  const auto counted = [&](std::size_t i) {
+    ++loads;
+    return maps_[i];
+  };
+  const std::vector<std::vector<std::size_t>> others = {{1, 2}, {0, 2}, {0, 1}};
+  const PointCloud once = fuse(views_, others, counted);
+  EXPECT_EQ(loads, 3);
+  FusionOptions options;
+  options.cache_bytes = 1;
+  double done = 0;
+  const PointCloud often =
+      fuse(views_, others, counted, options, [&done](double share) { done = share; });
+  EXPECT_GT(loads, 9);
+  EXPECT_EQ(done, 1);
+  ASSERT_EQ(often.size(), once.size());
+  for (std::size_t i = 0; i < once.size(); ++i) EXPECT_EQ(often[i].position, once[i].position);
+}
+
+TEST_F(Fusion, MapsThatDoNotFitAreNamed) {
+  maps_[1].distance = cv::Mat::ones(4, 4, CV_32FC1);
+  EXPECT_NE(test::error_of([this] { fuse_all(); }).find(views_[1].name), std::string::npos);
+  EXPECT_NE(test::error_of([this] {
+              fuse(views_, {{}}, [this](std::size_t i) { return maps_[i]; });
+            }).find("3 views"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace widestereo
