@@ -7,6 +7,7 @@
 void add_demo_command(CLI::App& app);
 void add_depth_command(CLI::App& app);
 void add_sequence_command(CLI::App& app);
+void add_reconstruct_command(CLI::App& app);
 void add_evaluate_command(CLI::App& app);
 void add_view_synthesis_command(CLI::App& app);
 void add_calibration_command(CLI::App& app);

@@ -33,21 +33,6 @@ struct DepthArguments {
   bool as_json = false;
 };
 
-/// The range of a reconstruction's points where none is given: presets have one in metres.
-MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& images,
-                         const std::string& calibration) {
-  if (settings.min_distance && settings.max_distance) return settings;
-  if (images.distances) {
-    if (!settings.min_distance) settings.min_distance = images.distances->nearest;
-    if (!settings.max_distance) settings.max_distance = images.distances->farthest;
-  } else if (!images.in_metres) {
-    throw ws::Error(calibration +
-                    " has too few points in these images to tell how far the scene reaches; give "
-                    "--min-distance and --max-distance.");
-  }
-  return settings;
-}
-
 /// One image is joined by the best ones of its COLMAP model.
 std::vector<std::string> files_of(const DepthArguments& arguments) {
   std::vector<std::string> files = arguments.images;

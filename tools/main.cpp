@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   add_demo_command(app);
   add_depth_command(app);
   add_sequence_command(app);
+  add_reconstruct_command(app);
   add_evaluate_command(app);
   add_view_synthesis_command(app);
   add_calibration_command(app);

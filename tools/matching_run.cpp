@@ -8,6 +8,20 @@
 
 namespace ws = widestereo;
 
+MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& images,
+                         const std::string& calibration) {
+  if (settings.min_distance && settings.max_distance) return settings;
+  if (images.distances) {
+    if (!settings.min_distance) settings.min_distance = images.distances->nearest;
+    if (!settings.max_distance) settings.max_distance = images.distances->farthest;
+  } else if (!images.in_metres) {
+    throw ws::Error(calibration +
+                    " has too few points in these images to tell how far the scene reaches; give "
+                    "--min-distance and --max-distance.");
+  }
+  return settings;
+}
+
 ws::Device open_device(const MatchSettings& settings) {
   ws::Device device = ws::Device::open(settings.device);
   if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <vector>
 
 #include "match_settings.h"
+#include "widestereo/colmap.h"
 #include "widestereo/matcher.h"
 
 struct MatchingRun {
@@ -14,6 +16,11 @@ struct MatchingRun {
   widestereo::DeviceInfo device;
   widestereo::StereoResult result;
 };
+
+/// The settings with the range of distances of a reconstruction's points where none is given:
+/// presets have one in metres. `calibration` names the file.
+MatchSettings with_range(MatchSettings settings, const widestereo::CalibratedImages& images,
+                         const std::string& calibration);
 
 /// Opens the device and reports, on standard error, those passed over.
 widestereo::Device open_device(const MatchSettings& settings);

@@ -88,14 +88,6 @@ class ViewWriter {
     ws::write_image(named("reasons", ".png"), result_.reasons);
   }
 
-  /// Behind and above the camera, in proportion to the scene, looking down a little: what is wrong
-  /// in a map leaves its surface there.
-  Eigen::Isometry3d viewpoint(const ws::ColourRange& range) const {
-    const double scale = 2 * range.nearest;
-    return view_.world_from_camera * Eigen::Translation3d(0, -0.5 * scale, -0.7 * scale) *
-           Eigen::AngleAxisd(-0.35, Eigen::Vector3d::UnitX());
-  }
-
   void write_pictures(const ws::PointCloud& cloud) {
     const cv::Mat& image = contents_.images[index_];
     const bool has_truth = !contents_.truths.empty();
@@ -121,7 +113,8 @@ class ViewWriter {
         {"normals", normals},
         {"confidence", confidence},
         {"rejected because", reasons},
-        {"accepted points", ws::cloud_picture(cloud, viewpoint(range), image.size())}};
+        {"accepted points",
+         ws::cloud_picture(cloud, viewpoint_behind(view_.world_from_camera, range), image.size())}};
     if (has_truth) {
       const ws::GroundTruth& truth = contents_.truths[index_];
       panels.push_back({"true distance", distances(truth.distance)});
@@ -179,6 +172,13 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
 
 }  // namespace
 
+Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
+                                   const ws::ColourRange& range) {
+  const double scale = 2 * range.nearest;
+  return world_from_camera * Eigen::Translation3d(0, -0.5 * scale, -0.7 * scale) *
+         Eigen::AngleAxisd(-0.35, Eigen::Vector3d::UnitX());
+}
+
 double accepted_share(const ws::ViewResult& view) {
   return share_of_usable(view, view.reasons == 0);
 }
@@ -203,10 +203,16 @@ void FolderFormat::add_to(CLI::App& command) {
 
 void FolderFormat::add_for_many_frames_to(CLI::App& command) {
   add_maps_to(command);
+  add_extras_to(command, "the rig's frame; poses are not applied");
+}
+
+void FolderFormat::add_for_fused_images_to(CLI::App& command) {
+  add_extras_to(command, "of each image");
+}
+
+void FolderFormat::add_extras_to(CLI::App& command, const std::string& clouds) {
   no_cloud = no_pictures = true;
-  command
-      .add_flag("--clouds{false}", no_cloud,
-                "Write point clouds (the rig's frame; poses are not applied)")
+  command.add_flag("--clouds{false}", no_cloud, "Write point clouds (" + clouds + ")")
       ->group(group);
   command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
 }

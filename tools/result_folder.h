@@ -10,6 +10,7 @@
 
 #include "matching_run.h"
 #include "widestereo/evaluation.h"
+#include "widestereo/pictures.h"
 #include "widestereo/rig.h"
 
 /// Which files are written.
@@ -22,10 +23,18 @@ struct FolderFormat {
   void add_to(CLI::App& command);
   /// The same for many frames, with --clouds and --pictures: neither is written unless asked for.
   void add_for_many_frames_to(CLI::App& command);
+  /// --clouds and --pictures alone: maps that are read again are TIFFs.
+  void add_for_fused_images_to(CLI::App& command);
 
  private:
   void add_maps_to(CLI::App& command);
+  void add_extras_to(CLI::App& command, const std::string& clouds);
 };
+
+/// Behind and above a camera, in proportion to the scene, looking down a little: what is wrong in a
+/// map leaves its surface there.
+Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
+                                   const widestereo::ColourRange& range);
 
 /// How much of a view's lens was accepted, in [0, 1].
 double accepted_share(const widestereo::ViewResult& view);

@@ -17,6 +17,10 @@ void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_othe
       .add_option("-c,--calibration", calibration,
                   "Kalibr camchain, Basalt JSON or OpenCV file" + or_other)
       ->required();
+  add_fields_of_view_to(command);
+}
+
+void RigSettings::add_fields_of_view_to(CLI::App& command) {
   command.add_option("--mask", masks,
                      "Image, 0 = ignore the pixel; once for all views or once for each");
   command
@@ -91,22 +95,30 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
 void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& images) const {
   if (max_theta > 0 || !masks.empty()) return;
   const std::vector<ws::View> calibrated = rig.views;
+  std::vector<bool> limited(calibrated.size());
   for (std::size_t i = 0; i < calibrated.size(); ++i) {
     const ws::Camera& camera = calibrated[i].camera;
-    if (camera.max_theta < std::numbers::pi) continue;
+    if (limited[i] || camera.max_theta < std::numbers::pi) continue;
     // One camera may have taken several views.
+    std::vector<std::size_t> of_camera;
     std::vector<cv::Mat> seen;
-    for (std::size_t j = 0; j < calibrated.size(); ++j) {
-      const bool fits = images[j].size() == cv::Size(camera.width, camera.height);
-      if (fits && calibrated[j].camera == camera) seen.push_back(images[j]);
+    for (std::size_t j = i; j < calibrated.size(); ++j) {
+      if (!(calibrated[j].camera == camera)) continue;
+      of_camera.push_back(j);
+      if (images[j].size() == cv::Size(camera.width, camera.height)) seen.push_back(images[j]);
     }
     const auto rim = ws::find_lens_rim(camera, seen);
+    for (const std::size_t j : of_camera) {
+      limited[j] = true;
+      if (rim) rig.views[j].camera.max_theta = rim->usable;
+    }
     if (!rim) continue;
-    rig.views[i].camera.max_theta = rim->usable;
-    std::fprintf(stderr,
-                 "widestereo: %s is black from %.1f degrees off the axis on and matched up to %.1f "
-                 "(--max-theta 180 matches all).\n",
-                 rig.views[i].name.c_str(), rim->dark * 180 / std::numbers::pi,
-                 rim->usable * 180 / std::numbers::pi);
+    std::fprintf(
+        stderr,
+        "widestereo: %s%s is black from %.1f degrees off the axis on and matched up to %.1f "
+        "(--max-theta 180 matches all).\n",
+        rig.views[i].name.c_str(),
+        of_camera.size() > 1 ? ", like the other images of its camera," : "",
+        rim->dark * 180 / std::numbers::pi, rim->usable * 180 / std::numbers::pi);
   }
 }

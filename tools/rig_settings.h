@@ -16,9 +16,11 @@ struct RigSettings {
   std::vector<std::string> masks;  ///< none, one for all images or one for each
   double max_theta = 0;            ///< degrees, 0 = as calibrated, or where images end
 
-  /// Adds --calibration, --mask and --max-theta; `or_other`: what else --calibration may be.
+  /// Adds --mask and --max-theta.
+  void add_fields_of_view_to(CLI::App& command);
+  /// Adds these and --calibration; `or_other`: what else it may be.
   void add_whole_rig_to(CLI::App& command, const std::string& or_other = "");
-  /// The same and --views.
+  /// Adds these and --views.
   void add_to(CLI::App& command, const std::string& or_other = "");
   /// All calibrated views, with masks; `size` of the first image.
   widestereo::Rig whole_rig(cv::Size size) const;
@@ -32,6 +34,6 @@ struct RigSettings {
   /// so; one image for each view.
   void leave_out_dark_rims(widestereo::Rig& rig, const std::vector<cv::Mat>& images) const;
 
- private:
+  /// Applies --mask and --max-theta.
   void limit_fields_of_view(widestereo::Rig& rig) const;
 };

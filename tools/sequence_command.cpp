@@ -19,6 +19,7 @@
 #include "rig_settings.h"
 #include "sequence_folder.h"
 #include "sharpness_settings.h"
+#include "view_record.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/motion.h"
@@ -101,27 +102,6 @@ void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& i
   for (std::size_t i = 0; i < images.size(); ++i) {
     ws::require_calibrated_size(images[i], rig.views[i], frame.images[i].string());
   }
-}
-
-Json to_json(const Eigen::Isometry3d& pose) {
-  Json rows = Json::array();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) rows.push_back(pose.matrix()(row, column));
-  }
-  return rows;
-}
-
-Json to_json(const ws::View& view) {
-  const ws::Camera& c = view.camera;
-  return {{"name", view.name},
-          {"model", to_string(c.model)},
-          {"size", {c.width, c.height}},
-          {"intrinsics",
-           {c.fx, c.fy, c.cx, c.cy, c.skew, c.xi, c.alpha, c.beta, c.omega, c.k1, c.k2, c.k3, c.k4,
-            c.p1, c.p2}},
-          {"max_theta", c.max_theta},
-          {"world_from_camera", to_json(view.world_from_camera)},
-          {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)}};
 }
 
 /// All that decides the results of a frame.

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The output folder of a sequence: one result folder for each frame, complete or absent, and the
-// record sequence.json.
+// The output folder of a sequence: its frames' results, and what the next frame starts from.
 #pragma once
 
 #include <filesystem>
@@ -9,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "result_folders.h"
 #include "widestereo/matcher.h"
 #include "widestereo/rig.h"
 
@@ -16,16 +16,14 @@ class SequenceFolder {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Takes up the folder where an earlier run left it. `settings`: all that decides the results;
-  /// throws Error naming the first difference to those of an earlier run, whose frames are removed
-  /// instead with `overwrite`.
+  /// As ResultFolders.
   SequenceFolder(std::filesystem::path folder, const Json& settings, bool overwrite);
 
   /// How many of these frames, from the first on, are there already. Forgets all others.
   std::size_t finished(const std::vector<std::string>& names);
   /// Records of the finished frames, in order.
-  const Json& frames() const { return record_["frames"]; }
-  const Json& record() const { return record_; }
+  const Json& frames() const { return results_.results(); }
+  const Json& record() const { return results_.record(); }
 
   /// Adds a frame: `write` fills the folder that it is given and returns the frame's record. The
   /// frame appears when all of it is there. Its planes are kept until the next one is.
@@ -38,8 +36,5 @@ class SequenceFolder {
                                              const widestereo::Rig& rig) const;
 
  private:
-  void read(const Json& settings, bool overwrite);
-
-  std::filesystem::path folder_;
-  Json record_;
+  ResultFolders results_;
 };

@@ -46,11 +46,13 @@ class ColmapModel {
 
   /// Calibration and poses of images, validated; views are named as the images are. The world frame
   /// and the unit of length are the reconstruction's: metres only where it was scaled to them.
-  /// COLMAP's pixel centres, at half pixels, are moved to whole ones. Distances reach from 0.75 of
-  /// the 1st to 1.25 of the 99th percentile of those between the images and the points that they
-  /// observe; they are missing where that is fewer than 20. Throws Error, also for camera models
-  /// that have no equivalent here (thin prisms, division, equirectangular).
+  /// COLMAP's pixel centres, at half pixels, are moved to whole ones. Throws Error, also for camera
+  /// models that have no equivalent here (thin prisms, division, equirectangular).
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const;
+
+  /// From 0.75 of the 1st to 1.25 of the 99th percentile of the distances between the images and
+  /// the points that they observe; nothing where that is fewer than 20.
+  std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const;
 
   /// At most `count` other images to match `image` with, best first: those that observe most of its
   /// points, each of which counts by the angle between the two rays to it (most at 5 degrees: Yao

@@ -143,8 +143,24 @@ class ColmapModel::Implementation {
       view.world_from_camera = image.camera_from_world.inverse();
     }
     validate(calibrated.rig, folder_.string());
-    calibrated.distances = distances_of(images);
+    calibrated.distances = distances(images);
     return calibrated;
+  }
+
+  std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const {
+    std::vector<double> values;
+    for (const std::size_t number : images) {
+      const ColmapImage& image = images_.at(number);
+      for (const std::uint64_t observed : image.points) {
+        const auto point = points_.find(observed);
+        if (point == points_.end()) continue;
+        const double distance = (image.camera_from_world * point->second.position).norm();
+        if (std::isfinite(distance)) values.push_back(distance);
+      }
+    }
+    if (values.size() < fewest_points) return std::nullopt;
+    return DistanceRange{.nearest = (1 - margin) * percentile(values, outliers),
+                         .farthest = (1 + margin) * percentile(values, 1 - outliers)};
   }
 
   std::vector<std::size_t> sources(std::size_t image, std::size_t count) const {
@@ -196,22 +212,6 @@ class ColmapModel::Implementation {
           known.emplace(number, Point{position, std::move(point->second.observers)});
         });
     points_ = std::move(known);
-  }
-
-  std::optional<DistanceRange> distances_of(const std::vector<std::size_t>& images) const {
-    std::vector<double> distances;
-    for (const std::size_t number : images) {
-      const ColmapImage& image = images_[number];
-      for (const std::uint64_t observed : image.points) {
-        const auto point = points_.find(observed);
-        if (point == points_.end()) continue;
-        const double distance = (image.camera_from_world * point->second.position).norm();
-        if (std::isfinite(distance)) distances.push_back(distance);
-      }
-    }
-    if (distances.size() < fewest_points) return std::nullopt;
-    return DistanceRange{.nearest = (1 - margin) * percentile(distances, outliers),
-                         .farthest = (1 + margin) * percentile(distances, 1 - outliers)};
   }
 
   Worths worth_of_others(std::size_t number) const {
@@ -273,6 +273,10 @@ std::size_t ColmapModel::image_of(const fs::path& file) const {
 
 CalibratedImages ColmapModel::calibrated(const std::vector<std::size_t>& images) const {
   return implementation_->calibrated(images);
+}
+
+std::optional<DistanceRange> ColmapModel::distances(const std::vector<std::size_t>& images) const {
+  return implementation_->distances(images);
 }
 
 std::vector<std::size_t> ColmapModel::sources(std::size_t image, std::size_t count) const {

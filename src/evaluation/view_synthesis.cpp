@@ -44,12 +44,12 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
   };
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
-      const double d = distance.at<float>(y, x);
+      const float d = distance.at<float>(y, x);
       Eigen::Vector3d ray;
       Eigen::Vector2d u;
       if (!has_distance(d) || is_masked(view, {x, y}) || !unproject(view.camera, {x, y}, ray))
         continue;
-      const Eigen::Vector3d point = motion * (d * ray);
+      const Eigen::Vector3d point = motion * (static_cast<double>(d) * ray);
       if (!project(other.camera, point, u) || u.x() < 0 || u.y() < 0 ||
           u.x() > other_image.cols - 1 || u.y() > other_image.rows - 1 || is_masked(other, u)) {
         continue;

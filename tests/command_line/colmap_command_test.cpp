@@ -126,5 +126,132 @@ TEST_F(ColmapCommand, MasksAndFieldsOfViewApply) {
   EXPECT_GT(cv::countNonZero(distance_in("colmap").colRange(48, 96)), 500);
 }
 
+/// All of them, one of which sees nothing of the others.
+class ReconstructCommand : public ColmapCommand {
+ protected:
+  void SetUp() override {
+    ColmapCommand::SetUp();
+    std::filesystem::create_directories(folder_ / "images/right");
+    std::filesystem::copy_file(file("left.png"), folder_ / "images/left.png");
+    std::filesystem::copy_file(file("right.png"), folder_ / "images/right/1.png");
+    std::filesystem::copy_file(file("left.png"), folder_ / "images/away.png");
+    rename_in_model("right.png", "right/1.png");
+  }
+  void rename_in_model(const std::string& from, const std::string& to) {
+    std::string text = bytes_of("model/images.txt");
+    text.replace(text.find(from), from.size(), to);
+    folder_.write("model/images.txt", text);
+  }
+  std::string bytes_of(const std::string& name) const {
+    std::ifstream stream(folder_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  std::string reconstruct(const std::string& output = "out") const {
+    return "reconstruct " + file("images") + " -c " + file("model") + " -o " + file(output) +
+           " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2 ";
+  }
+  nlohmann::json record() const {
+    return nlohmann::json::parse(bytes_of("out/reconstruction.json"));
+  }
+};
+
+TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
+  const Outcome outcome = run(reconstruct());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("1 of 3 images share no points with others"), std::string::npos)
+      << outcome.output;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/away.png"));
+  EXPECT_EQ(record()["images"][0]["group"][1]["name"], "right/1.png");
+  EXPECT_EQ(options_of("out/left.png")["min_distance"], 0.75);
+  // The same as by `depth`.
+  const std::string pair = file("images/left.png") + " " + file("images/right/1.png");
+  ASSERT_EQ(run("depth " + pair + " -c " + file("model") + " -o " + file("pair") +
+                " --preset paper --device cpu --iterations 2 --second-iterations 1"
+                " --window-radius 2")
+                .exit_code,
+            0);
+  EXPECT_EQ(cv::norm(distance_in("out/left.png"), distance_in("pair"), cv::NORM_INF), 0);
+  const cv::Mat second = cv::imread(file("pair/distance1.tiff"), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(cv::norm(distance_in("out/right/1.png"), second, cv::NORM_INF), 0);
+  const auto points = record()["cloud"]["points"].get<std::size_t>();
+  const cv::Mat accepted = cv::imread(file("pair/distance_accepted0.tiff"), cv::IMREAD_UNCHANGED);
+  EXPECT_GT(points, 0.3 * cv::countNonZero(accepted));
+  EXPECT_NE(bytes_of("out/cloud.ply").find("element vertex " + std::to_string(points) + "\n"),
+            std::string::npos);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/cloud_preview.png"));
+}
+
+TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  const std::string left = bytes_of("out/left.png/result.json");
+  const std::string right = bytes_of("out/right/1.png/distance0.tiff");
+  const std::string cloud = bytes_of("out/cloud.ply");
+  std::filesystem::remove_all(folder_ / "out/right");
+  std::filesystem::remove(folder_ / "out/cloud.ply");
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  EXPECT_TRUE(bytes_of("out/left.png/result.json") == left);  // with the time it took
+  EXPECT_TRUE(bytes_of("out/right/1.png/distance0.tiff") == right);
+  EXPECT_TRUE(bytes_of("out/cloud.ply") == cloud);
+  // Fusion may be repeated otherwise.
+  ASSERT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
+  EXPECT_TRUE(bytes_of("out/left.png/result.json") == left);
+  EXPECT_GT(bytes_of("out/cloud.ply").size(), cloud.size());
+  expect_error(reconstruct() + "--max-cost 0.3", "made with other settings: options/max_cost");
+  ASSERT_EQ(run(reconstruct() + "--max-cost 0.3 --overwrite").exit_code, 0);
+}
+
+TEST_F(ReconstructCommand, ImagesThatMovedAreMatchedAgain) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  const std::string before = bytes_of("out/left.png/distance0.tiff");
+  rename_in_model("-0.1 0 0", "-0.2 0 0");
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  EXPECT_TRUE(bytes_of("out/left.png/distance0.tiff") != before);
+  EXPECT_EQ(record()["images"].size(), 2U);
+}
+
+TEST_F(ReconstructCommand, MasksAreOfEachImage) {
+  std::filesystem::create_directories(folder_ / "masks/right");
+  cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 48) = 0;
+  cv::imwrite(file("masks/right/1.png.png"), mask);
+  const Outcome outcome = run(reconstruct() + "--masks " + file("masks"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(cv::countNonZero(distance_in("out/right/1.png").colRange(0, 48)), 0);
+  EXPECT_GT(cv::countNonZero(distance_in("out/right/1.png")), 1000);
+  EXPECT_EQ(record()["images"][0]["group"][0]["masked_pixels"], 0);
+  EXPECT_EQ(record()["images"][0]["group"][1]["masked_pixels"], 48 * 96);
+  cv::imwrite(file("masks/right/1.png.png"), cv::Mat(mask, cv::Rect(0, 0, 9, 9)));
+  expect_error(reconstruct() + "--overwrite --masks " + file("masks"), "1.png.png");
+}
+
+TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
+  expect_error(reconstruct() + "--masks " + file("none"), "none is no folder");
+  const std::string mask = " --mask " + file("left.png");
+  expect_error(reconstruct() + mask + mask, "--mask is for all images");
+  EXPECT_NE(run(reconstruct() + "--sources 0").exit_code, 0);
+  std::filesystem::remove(folder_ / "images/away.png");
+  expect_error(reconstruct(), "away.png is missing");
+  cv::imwrite(file("images/away.png"), cv::Mat(9, 9, CV_8UC1, cv::Scalar(0)));
+  expect_error(reconstruct(), "away.png");
+  std::filesystem::copy_file(file("left.png"), folder_ / "images/away.png",
+                             std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::remove(folder_ / "model/points3D.txt");
+  expect_error(reconstruct(), "has no images that share points");
+  expect_error("reconstruct " + file("images") + " -c " + file("same.yaml") + " -o " + file("out"),
+               "is no COLMAP model");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
+TEST_F(ReconstructCommand, FoldersOfOthersAreLeftAlone) {
+  std::filesystem::create_directories(folder_ / "out/left.png");
+  folder_.write("out/left.png/notes.txt", "mine");
+  const Outcome outcome = run(reconstruct());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("out/left.png is there already and holds no result"),
+            std::string::npos)
+      << outcome.output;
+  EXPECT_EQ(bytes_of("out/left.png/notes.txt"), "mine");
+}
+
 }  // namespace
 }  // namespace widestereo
