@@ -87,7 +87,7 @@ class ReconstructionImages {
 
   /// To match with each other; throws Error where no image has another one.
   std::vector<Images> groups() const {
-    std::vector<Images> groups = model_.groups(static_cast<std::size_t>(arguments_.sources) + 1);
+    std::vector<Images> groups = model_.selection().groups(static_cast<std::size_t>(arguments_.sources) + 1);
     if (std::all_of(groups.begin(), groups.end(), is_alone)) {
       throw ws::Error(arguments_.rig.calibration +
                       " has no images that share points (points3D), by which those are chosen that "
@@ -311,7 +311,7 @@ class Reconstruction {
     }
     std::vector<std::vector<std::size_t>> others(views.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
-      for (const std::size_t other : images_.model().sources(numbers[i], fused_with)) {
+      for (const std::size_t other : images_.model().selection().sources(numbers[i], fused_with)) {
         if (is_matched(other)) others[i].push_back(places[other]);
       }
     }

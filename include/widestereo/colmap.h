@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "widestereo/rig.h"
+#include "widestereo/view_selection.h"
 
 namespace widestereo {
 
@@ -54,15 +55,8 @@ class ColmapModel {
   /// the points that they observe; nothing where that is fewer than 20.
   std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const;
 
-  /// At most `count` other images to match `image` with, best first: those that observe most of its
-  /// points, each of which counts by the angle between the two rays to it (most at 5 degrees: Yao
-  /// et al., MVSNet, ECCV 2018, section 4.1). Fewer where fewer share points.
-  std::vector<std::size_t> sources(std::size_t image, std::size_t count) const;
-
-  /// Groups of at most `size` images to match with each other, which together hold every image. An
-  /// image of an earlier group is in another one, too, where it suits that much better than all
-  /// that have none yet. Images that share points with no other are groups of one.
-  std::vector<std::vector<std::size_t>> groups(std::size_t size) const;
+  /// Which images to match with each other, by the model's points.
+  const ViewSelection& selection() const;
 
  private:
   class Implementation;
@@ -73,8 +67,8 @@ class ColmapModel {
 CalibratedImages read_colmap(const std::filesystem::path& folder,
                              const std::vector<std::filesystem::path>& files);
 
-/// ColmapModel::sources() of the image of a file, as files of the folder of images that it lies in
-/// by its name.
+/// ViewSelection::sources() of the image of a file, as files of the folder of images that it lies
+/// in by its name.
 std::vector<std::filesystem::path> colmap_sources(const std::filesystem::path& folder,
                                                   const std::filesystem::path& file,
                                                   std::size_t count);

@@ -37,6 +37,12 @@ inline double baseline(const View& a, const View& b) {
   return (a.world_from_camera.translation() - b.world_from_camera.translation()).norm();
 }
 
+/// Whether two camera centres (world frame) are far enough apart to tell distances at all.
+inline bool has_baseline(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  constexpr double least = 1e-9;  // metres
+  return (a - b).norm() > least;
+}
+
 /// Whether the view's mask excludes the pixel nearest to a position, or what lies outside the mask.
 bool is_masked(const View& view, const Eigen::Vector2d& position);
 

@@ -119,7 +119,10 @@ void validate(const Rig& rig, const std::string& name) {
   if (rig.world_from_imu) require_rigid(*rig.world_from_imu, name + ": IMU");
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.views.size(); ++j) {
-      if (baseline(rig.views[i], rig.views[j]) > 1e-9) continue;
+      if (has_baseline(rig.views[i].world_from_camera.translation(),
+                       rig.views[j].world_from_camera.translation())) {
+        continue;
+      }
       throw Error(name + ": " + rig.views[i].name + " and " + rig.views[j].name +
                   " have the same centre; stereo needs a baseline.");
     }

@@ -255,12 +255,12 @@ TEST_F(Colmap, GroupsAreOfImagesThatSeeTheSame) {
   using Groups = std::vector<std::vector<std::size_t>>;
   // b has d and g at 5.1 degrees, f at 10.2; d has f at 5.1 and g at 10.3. g, which is left, is
   // joined by those that were matched before.
-  EXPECT_EQ(model.groups(3), (Groups{{0, 2, 4}, {1, 3, 5}, {6, 1, 3}, {7}}));
+  EXPECT_EQ(model.selection().groups(3), (Groups{{0, 2, 4}, {1, 3, 5}, {6, 1, 3}, {7}}));
   // e has no other image left; f has g at 15.4 degrees, worth more than half of d at 5.1.
-  EXPECT_EQ(model.groups(2), (Groups{{0, 2}, {1, 3}, {4, 2}, {5, 6}, {7}}));
-  EXPECT_EQ(model.groups(8), (Groups{{0, 2, 4}, {1, 3, 5, 6}, {7}}));
+  EXPECT_EQ(model.selection().groups(2), (Groups{{0, 2}, {1, 3}, {4, 2}, {5, 6}, {7}}));
+  EXPECT_EQ(model.selection().groups(8), (Groups{{0, 2, 4}, {1, 3, 5, 6}, {7}}));
   fs::remove(folder_.path() / "points3D.txt");
-  EXPECT_EQ(ColmapModel(folder_.path()).groups(3).size(), 8U);
+  EXPECT_EQ(ColmapModel(folder_.path()).selection().groups(3).size(), 8U);
 }
 
 TEST_F(Colmap, ReadsBinaryPoints) {
