@@ -87,7 +87,8 @@ class ReconstructionImages {
 
   /// To match with each other; throws Error where no image has another one.
   std::vector<Images> groups() const {
-    std::vector<Images> groups = model_.selection().groups(static_cast<std::size_t>(arguments_.sources) + 1);
+    std::vector<Images> groups =
+        model_.selection().groups(static_cast<std::size_t>(arguments_.sources) + 1);
     if (std::all_of(groups.begin(), groups.end(), is_alone)) {
       throw ws::Error(arguments_.rig.calibration +
                       " has no images that share points (points3D), by which those are chosen that "
@@ -181,8 +182,10 @@ class Reconstruction {
         groups_(images_.groups()),
         views_(images_.views()),
         device_(open_device(arguments.settings)),
-        folders_(arguments.output, {.name = "reconstruction", .results = "images"},
-                 settings_of(arguments, device_.info()), arguments.overwrite) {}
+        folders_(
+            arguments.output,
+            {.name = "reconstruction", .results = "images", .texts = {}, .numbers = {"accepted"}},
+            settings_of(arguments, device_.info()), arguments.overwrite) {}
 
   void run() {
     const auto alone =
@@ -281,6 +284,7 @@ class Reconstruction {
         {"group", views_of(group)}};
     folders_.add(images_.name(image), [&](const fs::path& folder) {
       FolderContents contents{.rig = rig, .images = images, .run = run, .in_metres = false};
+      contents.origin = folders_.origin();
       for (const std::size_t member : group) {
         contents.origin["images"].push_back(images_.file(images_.name(member)).string());
       }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <utility>
 
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -42,31 +43,41 @@ bool is_within_folder(const fs::path& name) {
 
 ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, bool overwrite)
     : folder_(std::move(folder)), kind_(std::move(kind)) {
+  kind_.texts.emplace_back("name");
   ws::prepare_output_folder(folder_);
   read(settings, overwrite);
   std::error_code ignored;
   fs::remove_all(folder_ / unfinished, ignored);
 }
 
+bool ResultFolders::is_record_of_result(const Json& record) const {
+  const auto all = [&record](const std::vector<std::string>& keys, auto&& is_type) {
+    return std::all_of(keys.begin(), keys.end(), [&](const std::string& key) {
+      return record.contains(key) && is_type(record[key]);
+    });
+  };
+  return record.is_object() &&
+         all(kind_.texts, [](const Json& value) { return value.is_string(); }) &&
+         all(kind_.numbers, [](const Json& value) { return value.is_number(); }) &&
+         is_within_folder(record["name"].get<std::string>());
+}
+
 void ResultFolders::read(const Json& settings, bool overwrite) {
   const fs::path path = folder_ / (kind_.name + ".json");
   record_ = {{"settings", settings}, {kind_.results, Json::array()}};
   if (!fs::exists(path)) return;
-  Json before;
-  try {
-    before = Json::parse(std::ifstream(path));
-    for (const Json& result : before.at(kind_.results)) {
-      if (!is_within_folder(result.at("name").get<std::string>())) throw ws::Error("name");
-    }
-    before.at("settings");
-  } catch (const std::exception&) {
+  const Json before = Json::parse(std::ifstream(path), nullptr, false);
+  const bool is_record = before.is_object() && before.contains("settings") &&
+                         before.contains(kind_.results) && before[kind_.results].is_array();
+  if (!is_record ||
+      !std::all_of(before[kind_.results].begin(), before[kind_.results].end(),
+                   [this](const Json& result) { return is_record_of_result(result); })) {
     throw ws::Error(path.string() + " is no record of a " + kind_.name +
                     "; choose another folder.");
   }
   if (overwrite) {
-    fs::remove(path);
     for (const Json& result : before[kind_.results]) {
-      fs::remove_all(folder_ / result["name"].get<std::string>());
+      obsolete_.push_back(result["name"].get<std::string>());
     }
     return;
   }
@@ -79,7 +90,30 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
 }
 
 bool ResultFolders::is_there(const Json& result) const {
-  return fs::exists(folder_ / result["name"].get<std::string>() / result_record);
+  const fs::path path = folder_ / result["name"].get<std::string>();
+  const Json record = Json::parse(std::ifstream(path / result_record), nullptr, false);
+  if (!record.is_object() || !record.contains("views")) return false;
+  for (const Json& view : record["views"]) {
+    if (!view.contains("files")) return false;
+    for (const Json& file : view["files"]) {
+      if (!file.is_string() || !fs::exists(path / file.get<std::string>())) return false;
+    }
+  }
+  return true;
+}
+
+void ResultFolders::remove(const std::string& name) const {
+  const fs::path path = folder_ / name;
+  if (!fs::exists(path)) return;
+  const Json record = Json::parse(std::ifstream(path / result_record), nullptr, false);
+  const Json whose = record.is_object() ? record.value("input", Json()) : Json();
+  if (!whose.is_object() || whose.value("run", "") != kind_.name) {
+    throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +
+                    "; choose another folder, or remove it.");
+  }
+  std::error_code error;
+  fs::remove_all(path, error);
+  if (error) throw ws::Error("Cannot remove " + path.string() + ": " + error.message() + ".");
 }
 
 void ResultFolders::add(const std::string& name,
@@ -88,18 +122,16 @@ void ResultFolders::add(const std::string& name,
   fs::remove_all(temporary);
   ws::prepare_output_folder(temporary);
   Json result = write(temporary);
+  for (const std::string& old : std::exchange(obsolete_, {})) remove(old);
+  remove(name);
+  // First, so that what has the name is known to be a result, whenever the run ends.
+  record_[kind_.results].push_back(std::move(result));
+  write_record();
   const fs::path path = folder_ / name;
   std::error_code error;
-  if (fs::exists(path) && !fs::exists(path / result_record)) {
-    throw ws::Error(path.string() +
-                    " is there already and holds no result; choose another folder.");
-  }
-  fs::remove_all(path, error);
   fs::create_directories(path.parent_path(), error);
   fs::rename(temporary, path, error);
   if (error) throw ws::Error("Cannot write " + path.string() + ": " + error.message() + ".");
-  record_[kind_.results].push_back(std::move(result));
-  write_record();
 }
 
 void ResultFolders::note(const std::string& key, Json value) {

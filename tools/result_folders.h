@@ -7,19 +7,22 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 class ResultFolders {
  public:
   using Json = nlohmann::ordered_json;
 
   struct Kind {
-    std::string name;     ///< of the run: the record is NAME.json
-    std::string results;  ///< what it has many of, the record's key
+    std::string name;                  ///< of the run: the record is NAME.json
+    std::string results;               ///< what it has many of, the record's key
+    std::vector<std::string> texts;    ///< that the record of each result has
+    std::vector<std::string> numbers;  ///< likewise
   };
 
   /// Takes up the folder where an earlier run left it. `settings`: all that decides the results;
-  /// throws Error naming the first difference to those of an earlier run, whose results are removed
-  /// instead with `overwrite`.
+  /// throws Error naming the first difference to those of an earlier run. With `overwrite` its
+  /// results are removed instead, as soon as there is a new one.
   ResultFolders(std::filesystem::path folder, Kind kind, const Json& settings, bool overwrite);
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -28,11 +31,15 @@ class ResultFolders {
   const Json& results() const { return record_[kind_.results]; }
   /// Forgets those results that are not among `kept`.
   void keep(Json kept) { record_[kind_.results] = std::move(kept); }
-  /// Whether the result that a record is about is still there.
+  /// Whether all files of the result that a record is about are still there.
   bool is_there(const Json& result) const;
 
-  /// Adds a result: `write` fills the folder that it is given and returns the record, which has the
-  /// name. The result appears when all of it is there.
+  /// What FolderContents::origin says of whose result it is.
+  Json origin() const { return {{"run", kind_.name}}; }
+
+  /// Adds a result: `write` fills the folder that it is given, with that origin, and returns the
+  /// record, which has the name. The result appears when all of it is there. Throws Error where
+  /// something else has the name.
   void add(const std::string& name, const std::function<Json(const std::filesystem::path&)>& write);
 
   /// Notes something of the whole run in the record.
@@ -40,9 +47,13 @@ class ResultFolders {
 
  private:
   void read(const Json& settings, bool overwrite);
+  bool is_record_of_result(const Json& record) const;
+  /// Removes a result, of this run or of an earlier one.
+  void remove(const std::string& name) const;
   void write_record() const;
 
   std::filesystem::path folder_;
   Kind kind_;
   Json record_;
+  std::vector<std::string> obsolete_;  // names of results to be removed
 };

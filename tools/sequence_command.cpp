@@ -110,10 +110,12 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
   const auto absolute = [](const std::string& path) {
     return path.empty() ? path : fs::absolute(path).lexically_normal().string();
   };
+  Json masks = Json::array();
+  for (const std::string& mask : a.rig.masks) masks.push_back(absolute(mask));
   Json settings = {{"program", "widestereo " WIDESTEREO_VERSION},
                    {"dataset", absolute(a.dataset)},
                    {"calibration", absolute(a.rig.calibration)},
-                   {"masks", a.rig.masks},
+                   {"masks", masks},
                    {"blurs", selection.blurs},
                    {"poses", absolute(a.poses.file)},
                    {"poses_of", selection.motion.of},
@@ -165,7 +167,7 @@ class SequenceRun {
         bar_("Matching on " + device_.info().name) {}
 
   void run() {
-    const std::size_t finished = folder_.finished(selection_.names());
+    const std::size_t finished = folder_.finished(selection_.names(), poses());
     remaining_ = selection_.frames.size() - finished;
     if (remaining_ == 0) return;
     ws::Matcher matcher(device_, selection_.rig, options_);
@@ -195,7 +197,21 @@ class SequenceRun {
     const std::vector<cv::Mat> images = read_images(frame);
     require_sizes(frame, images, selection_.rig);
     previous_ = {blurred(images, selection_.blurs), folder_.planes(frame.name, selection_.rig)};
+    if (previous_.views.empty() && !arguments_.no_warm_start) {
+      std::fprintf(stderr,
+                   "widestereo: The planes of frame %s are gone; the next one starts from none.\n",
+                   frame.name.c_str());
+    }
     for (const Json& record : folder_.frames()) note_cold(record);
+  }
+
+  /// Of each frame, null where it is not known.
+  std::vector<Json> poses() const {
+    std::vector<Json> poses(selection_.frames.size());
+    for (std::size_t i = 0; i < selection_.motion.poses.size(); ++i) {
+      poses[i] = to_json(selection_.motion.poses[i]);
+    }
+    return poses;
   }
 
   void note_cold(const Json& record) {
@@ -232,7 +248,7 @@ class SequenceRun {
       }
     }
     require_no_validation_messages(device_);
-    write(source, taken, frame);
+    write(index, taken, frame);
     previous_ = {images, std::move(result.views), true};
     ++matched_;
   }
@@ -267,8 +283,8 @@ class SequenceRun {
     return quality.accepted < arguments_.restart_below * cold_.accepted;
   }
 
-  void write(const ws::SequenceFrame& source, const std::vector<cv::Mat>& images,
-             const Frame& frame) {
+  void write(std::size_t index, const std::vector<cv::Mat>& images, const Frame& frame) {
+    const ws::SequenceFrame& source = selection_.frames[index];
     const ws::StereoResult& result = frame.run.result;
     const Quality quality = quality_of(result);
     Json record = {{"name", source.name},
@@ -279,10 +295,12 @@ class SequenceRun {
                    {"patch_samples", result.samples},
                    {"accepted", quality.accepted},
                    {"mean_cost", quality.mean_cost}};
+    if (arguments_.poses.given()) record["pose"] = to_json(selection_.motion.poses[index]);
     note_cold(record);
     folder_.add(source.name, result.views, [&](const fs::path& folder) {
       FolderContents contents{
           .rig = selection_.rig, .images = images, .run = frame.run, .blurs = selection_.blurs};
+      contents.origin = folder_.origin();
       for (const fs::path& image : source.images)
         contents.origin["images"].push_back(image.string());
       contents.origin["calibration"] = arguments_.rig.calibration;

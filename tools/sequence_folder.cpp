@@ -30,13 +30,22 @@ void write_planes(const fs::path& folder, const std::vector<ws::ViewResult>& vie
 }  // namespace
 
 SequenceFolder::SequenceFolder(fs::path folder, const Json& settings, bool overwrite)
-    : results_(std::move(folder), {.name = "sequence", .results = "frames"}, settings, overwrite) {}
+    : results_(std::move(folder),
+               {.name = "sequence",
+                .results = "frames",
+                .texts = {"start", "motion"},
+                .numbers = {"milliseconds", "motion_milliseconds", "patch_samples", "accepted",
+                            "mean_cost"}},
+               settings, overwrite) {}
 
-std::size_t SequenceFolder::finished(const std::vector<std::string>& names) {
+std::size_t SequenceFolder::finished(const std::vector<std::string>& names,
+                                     const std::vector<Json>& poses) {
   Json kept = Json::array();
   for (std::size_t i = 0; i < names.size() && i < frames().size(); ++i) {
-    if (frames()[i]["name"] != names[i] || !results_.is_there(frames()[i])) break;
-    kept.push_back(frames()[i]);
+    const Json& frame = frames()[i];
+    if (frame["name"] != names[i] || frame.value("pose", Json()) != poses[i]) break;
+    if (!results_.is_there(frame)) break;
+    kept.push_back(frame);
   }
   results_.keep(kept);
   return kept.size();

@@ -19,11 +19,14 @@ class SequenceFolder {
   /// As ResultFolders.
   SequenceFolder(std::filesystem::path folder, const Json& settings, bool overwrite);
 
-  /// How many of these frames, from the first on, are there already. Forgets all others.
-  std::size_t finished(const std::vector<std::string>& names);
+  /// How many of these frames, from the first on, are there already, with the same pose (null where
+  /// none is known). Forgets all others.
+  std::size_t finished(const std::vector<std::string>& names, const std::vector<Json>& poses);
   /// Records of the finished frames, in order.
   const Json& frames() const { return results_.results(); }
   const Json& record() const { return results_.record(); }
+  /// As ResultFolders::origin().
+  Json origin() const { return results_.origin(); }
 
   /// Adds a frame: `write` fills the folder that it is given and returns the frame's record. The
   /// frame appears when all of it is there. Its planes are kept until the next one is.

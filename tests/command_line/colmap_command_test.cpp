@@ -247,7 +247,7 @@ TEST_F(ReconstructCommand, FoldersOfOthersAreLeftAlone) {
   folder_.write("out/left.png/notes.txt", "mine");
   const Outcome outcome = run(reconstruct());
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.output.find("out/left.png is there already and holds no result"),
+  EXPECT_NE(outcome.output.find("out/left.png is there already and is no result of a reconstruction"),
             std::string::npos)
       << outcome.output;
   EXPECT_EQ(bytes_of("out/left.png/notes.txt"), "mine");

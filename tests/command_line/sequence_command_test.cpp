@@ -127,6 +127,60 @@ TEST_F(SequenceCommand, OtherSettingsNeedAnotherFolderOrOverwriting) {
   EXPECT_TRUE(fs::exists(folder_ / "data/cam0/000.png"));
 }
 
+TEST_F(SequenceCommand, OverwritingBeginsWithTheFirstNewFrame) {
+  ASSERT_EQ(run(sequence() + "--count 2").exit_code, 0);
+  const std::string before = bytes_of(folder_ / "out/sequence.json");
+  EXPECT_EQ(run(sequence() + "--overwrite --levels 4").exit_code, 1);
+  EXPECT_TRUE(bytes_of(folder_ / "out/sequence.json") == before);
+  EXPECT_TRUE(fs::exists(folder_ / "out/001/distance0.tiff"));
+  ASSERT_EQ(run(sequence() + "--overwrite --seed 5 --count 1").exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "out/001"));
+}
+
+TEST_F(SequenceCommand, FoldersOfOthersAreLeftAlone) {
+  const std::string depth = "depth " + file("data/cam0/000.png") + " " + file("data/cam1/000.png") +
+                            " -c " + file("calib.yaml") + quick;
+  ASSERT_EQ(run(depth + " -o " + file("out/000")).exit_code, 0);
+  const std::string theirs = bytes_of(folder_ / "out/000/result.json");
+  const Outcome outcome = run(sequence());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("out/000 is there already and is no result of a sequence"),
+            std::string::npos)
+      << outcome.output;
+  EXPECT_TRUE(bytes_of(folder_ / "out/000/result.json") == theirs);
+}
+
+TEST_F(SequenceCommand, DamagedRecordsAreRefusedAndDamagedFramesMatchedAgain) {
+  ASSERT_EQ(run(sequence() + "--count 2").exit_code, 0);
+  fs::remove(folder_ / "out/001/cost1.tiff");
+  ASSERT_EQ(run(sequence() + "--count 2").exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "out/001/cost1.tiff"));
+  // What the frame after it started from was kept no longer than that.
+  fs::remove(folder_ / "out/000/reasons0.png");
+  fs::remove_all(folder_ / "out/001");
+  const nlohmann::json whole = record();
+  for (const char* key : {"start", "milliseconds", "name"}) {
+    nlohmann::json damaged = whole;
+    damaged["frames"][0].erase(key);
+    folder_.write("out/sequence.json", damaged.dump());
+    const Outcome outcome = run(sequence());
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find("is no record of a sequence"), std::string::npos)
+        << outcome.output;
+  }
+  for (const char* text : {"{\"frames\": {}, \"settings\": {}}", "[]", "{\"frames\": [1]", "nan"}) {
+    folder_.write("out/sequence.json", text);
+    EXPECT_EQ(run(sequence()).exit_code, 1) << text;
+  }
+}
+
+TEST_F(SequenceCommand, MasksAreTheSameFromEveryFolder) {
+  cv::imwrite(file("mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  ASSERT_EQ(run(sequence() + "--count 1 --mask " + file("mask.png")).exit_code, 0);
+  const Outcome outcome = run(sequence() + "--count 2 --mask " + file("data/../mask.png"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+}
+
 TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
   add_frame(0, "001", 8);
   const Outcome outcome = run(sequence() + "--restart-below 1 --count 2 --no-motion");
@@ -216,6 +270,18 @@ TEST_F(SequencePoses, OfTheImuAreThoseOfTheCamera) {
   EXPECT_NE(bytes_of(folder_ / "wrong/002/distance0.tiff"),
             bytes_of(folder_ / "imu/002/distance0.tiff"))
       << "the motion matters here";
+}
+
+TEST_F(SequencePoses, FramesWithOtherPosesAreMatchedAgain) {
+  ASSERT_EQ(run(with("camera.txt", "out")).exit_code, 0);
+  std::string poses = bytes_of(folder_ / "camera.txt");
+  const std::string second = bytes_of(folder_ / "out/001/result.json");
+  poses.replace(poses.rfind("0.08"), 4, "0.09");
+  folder_.write("camera.txt", poses);
+  const Outcome outcome = run(with("camera.txt", "out"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(bytes_of(folder_ / "out/001/result.json") == second);
+  EXPECT_NE(outcome.output.find("002: "), std::string::npos) << outcome.output;
 }
 
 TEST_F(SequencePoses, NeedToBeOfWhatTheCalibrationKnows) {
