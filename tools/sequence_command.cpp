@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "frame_settings.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "pose_settings.h"
@@ -35,13 +36,10 @@ struct SequenceArguments {
   std::string dataset;
   std::string output;
   PoseSettings poses;
-  int first = 0;
-  int count = 0;  // 0 = all
-  int step = 1;
+  FrameSettings frames;
   double restart_below = 0.75;
   bool no_motion = false;
   bool no_warm_start = false;
-  bool skip_incomplete = false;
   bool overwrite = false;
   RigSettings rig;
   SharpnessSettings sharpness;
@@ -72,27 +70,16 @@ std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
 Selection select_frames(const SequenceArguments& a) {
   std::vector<int> cameras = a.rig.views;
   if (cameras.empty()) cameras = {0, 1};
-  const auto frames = ws::read_sequence(a.dataset, cameras, a.skip_incomplete);
-  if (a.first >= static_cast<int>(frames.size())) {
-    throw ws::Error(a.dataset + " has " + std::to_string(frames.size()) +
-                    " frames; there is no frame " + std::to_string(a.first) +
-                    " to start from (--first counts from 0).");
-  }
+  const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
-  std::vector<std::size_t> chosen;
-  for (std::size_t i = static_cast<std::size_t>(a.first); i < frames.size();
-       i += static_cast<std::size_t>(a.step)) {
-    if (a.count > 0 && chosen.size() == static_cast<std::size_t>(a.count)) break;
-    chosen.push_back(i);
-    selection.frames.push_back(frames[i]);
-  }
+  for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
   const std::vector<cv::Mat> first = read_images(selection.frames.front());
   selection.rig = a.rig.rig_for_images(cameras.size(), first.front().size());
   // The first frame alone decides, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);
   selection.blurs = a.sharpness.blurs(selection.rig, first);
   if (a.poses.given()) {
-    selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames, chosen);
+    selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen);
   }
   return selection;
 }
@@ -120,8 +107,8 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"poses", absolute(a.poses.file)},
                    {"poses_of", selection.motion.of},
                    {"poses_tolerance", a.poses.tolerance},
-                   {"first", a.first},
-                   {"step", a.step},
+                   {"first", a.frames.first},
+                   {"step", a.frames.step},
                    {"warm_start", !a.no_warm_start},
                    {"motion", !a.no_motion},
                    {"restart_below", a.restart_below},
@@ -366,33 +353,14 @@ void add_sequence_command(CLI::App& app) {
       "sequence",
       "Match many frames, each started from the planes of the one before; run it again to resume");
   auto a = std::make_shared<SequenceArguments>();
-  command
-      ->add_option(
-          "dataset", a->dataset,
-          "Folder with cam0/, cam1/, ... (frames have equal file names), or in EuRoC or TUM "
-          "VI layout (mav0/camN/data, data.csv)")
-      ->required();
+  command->add_option("dataset", a->dataset, FrameSettings::layouts)->required();
   a->rig.add_to(*command);
   a->sharpness.add_to(*command);
   command
       ->add_option("-o,--output", a->output,
                    "Folder for the results: one folder for each frame, and sequence.json")
       ->required();
-  const std::string frames = "Frames";
-  command->add_option("--first", a->first, "First frame, counted from 0")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str()
-      ->group(frames);
-  command->add_option("--count", a->count, "Number of frames at most, 0 = all")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str()
-      ->group(frames);
-  command->add_option("--step", a->step, "Take every so many frames")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str()
-      ->group(frames);
-  command->add_flag("--skip-incomplete", a->skip_incomplete, "Leave out frames that a camera lacks")
-      ->group(frames);
+  a->frames.add_to(*command);
   const std::string start = "Warm start";
   a->poses.add_to(*command, "without it the motion is estimated from the images", start);
   command->add_flag("--no-motion", a->no_motion, "Start where the planes were: no motion")

@@ -234,12 +234,28 @@ PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<st
                 std::to_string(views.size()) + " views, not " + std::to_string(others.size()) +
                 ".");
   }
-  Fusion fusion(views, maps, options);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    fusion.add(i, others[i]);
-    if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(views.size()));
+  for (const std::vector<std::size_t>& list : others) {
+    for (const std::size_t other : list) {
+      if (other < views.size()) continue;
+      throw Error("There is no view " + std::to_string(other) + " among the " +
+                  std::to_string(views.size()) + " to be fused; count from 0.");
+    }
   }
-  return fusion.take();
+  if (views.empty()) return {};
+  // Single precision is not enough for what lies far from the origin, as in national grids.
+  const Eigen::Vector3d origin = views.front().world_from_camera.translation();
+  std::vector<View> near = views;
+  for (View& view : near) view.world_from_camera.translation() -= origin;
+  Fusion fusion(near, maps, options);
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    fusion.add(i, others[i]);
+    if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(near.size()));
+  }
+  PointCloud cloud = fusion.take();
+  for (CloudPoint& point : cloud) {
+    point.position = (point.position.cast<double>() + origin).cast<float>();
+  }
+  return cloud;
 }
 
 }  // namespace widestereo

@@ -158,7 +158,7 @@ class ReconstructCommand : public ColmapCommand {
 TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
   const Outcome outcome = run(reconstruct());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("1 of 3 images share no points with others"), std::string::npos)
+  EXPECT_NE(outcome.output.find("1 of 3 images see nothing that others see"), std::string::npos)
       << outcome.output;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/away.png"));
   EXPECT_EQ(record()["images"][0]["group"][1]["name"], "right/1.png");
@@ -236,9 +236,9 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   std::filesystem::copy_file(file("left.png"), folder_ / "images/away.png",
                              std::filesystem::copy_options::overwrite_existing);
   std::filesystem::remove(folder_ / "model/points3D.txt");
-  expect_error(reconstruct(), "has no images that share points");
+  expect_error(reconstruct(), "has no images that see the same");
   expect_error("reconstruct " + file("images") + " -c " + file("same.yaml") + " -o " + file("out"),
-               "is no COLMAP model");
+               "same.yaml is no COLMAP model");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
@@ -247,8 +247,9 @@ TEST_F(ReconstructCommand, FoldersOfOthersAreLeftAlone) {
   folder_.write("out/left.png/notes.txt", "mine");
   const Outcome outcome = run(reconstruct());
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.output.find("out/left.png is there already and is no result of a reconstruction"),
-            std::string::npos)
+  EXPECT_NE(
+      outcome.output.find("out/left.png is there already and is no result of a reconstruction"),
+      std::string::npos)
       << outcome.output;
   EXPECT_EQ(bytes_of("out/left.png/notes.txt"), "mine");
 }

@@ -179,12 +179,24 @@ TEST_F(Fusion, MemoryLimitsChangeTimeOnly) {
   for (std::size_t i = 0; i < once.size(); ++i) EXPECT_EQ(often[i].position, once[i].position);
 }
 
+TEST_F(Fusion, WorksFarFromTheOrigin) {
+  const std::size_t near = fuse_all().size();
+  for (View& view : views_) view.world_from_camera.translation() += Eigen::Vector3d(6e5, 5.7e6, 70);
+  const PointCloud cloud = fuse_all();
+  EXPECT_EQ(cloud.size(), near);
+  EXPECT_NEAR(cloud.front().position.y(), 5.7e6, 100);
+}
+
 TEST_F(Fusion, MapsThatDoNotFitAreNamed) {
   maps_[1].distance = cv::Mat::ones(4, 4, CV_32FC1);
   EXPECT_NE(test::error_of([this] { fuse_all(); }).find(views_[1].name), std::string::npos);
   EXPECT_NE(test::error_of([this] {
               fuse(views_, {{}}, [this](std::size_t i) { return maps_[i]; });
             }).find("3 views"),
+            std::string::npos);
+  EXPECT_NE(test::error_of([this] {
+              fuse(views_, {{1}, {3}, {}}, [this](std::size_t i) { return maps_[i]; });
+            }).find("no view 3"),
             std::string::npos);
 }
 

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT
+#include "posed_images.h"
+
+#include <algorithm>
+#include <memory>
+#include <numeric>
+#include <opencv2/core.hpp>
+
+#include "widestereo/calibration.h"
+#include "widestereo/error.h"
+#include "widestereo/image_io.h"
+
+namespace ws = widestereo;
+namespace fs = std::filesystem;
+
+namespace {
+
+// Of a camera, to see where its lens ends.
+constexpr std::size_t rim_images = 8;
+
+std::vector<Eigen::Vector3d> centres_of(const std::vector<ws::View>& views) {
+  std::vector<Eigen::Vector3d> centres;
+  for (const ws::View& view : views) centres.push_back(view.world_from_camera.translation());
+  return centres;
+}
+
+}  // namespace
+
+cv::Mat PosedImages::read(std::size_t image) const {
+  cv::Mat pixels = ws::read_image(files[image]);
+  ws::require_calibrated_size(pixels, views[image], files[image].string());
+  return pixels;
+}
+
+void PosedImageSettings::add_to(CLI::App& command) {
+  command
+      .add_option(
+          "images", images,
+          std::string("Folder that the names of a COLMAP model's images begin in; or a data "
+                      "set: ") +
+              FrameSettings::layouts)
+      ->required();
+  rig.add_to(command, ", or folder of a COLMAP model, whose unit distances then have");
+  command.add_option(
+      "--masks", masks,
+      "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
+      "the pixel");
+  poses.add_to(command, "what is not a COLMAP model needs it", "Data sets");
+  frames.add_to(command);
+}
+
+PosedImages PosedImageSettings::read(const ws::Options& options) const {
+  PosedImages posed = ws::is_colmap_model(rig.calibration) ? of_colmap() : of_trajectory();
+  apply_masks(posed);
+  if (masks.empty()) leave_out_dark_rims(posed);
+  if (!ws::is_colmap_model(rig.calibration)) {
+    posed.selection = std::make_shared<const ws::ViewSelection>(
+        centres_of(posed.views),
+        ws::assumed_points(posed.views, options.min_distance, options.max_distance));
+  }
+  return posed;
+}
+
+PosedImages PosedImageSettings::of_colmap() const {
+  if (poses.given() || frames.given() || !rig.views.empty()) {
+    throw ws::Error("--poses, --views and the options of frames are for data sets, but " +
+                    rig.calibration +
+                    " is a COLMAP model, which has images and poses; leave them out.");
+  }
+  if (rig.masks.size() > 1) {
+    throw ws::Error(
+        "--mask is for all images of a COLMAP model; give one, or a folder of masks by --masks.");
+  }
+  const auto model = std::make_shared<const ws::ColmapModel>(rig.calibration);
+  PosedImages posed;
+  posed.in_metres = false;
+  Images all;
+  for (std::size_t i = 0; i < model->names().size(); ++i) {
+    posed.files.push_back(fs::path(images) / model->names()[i]);
+    if (!fs::exists(posed.files.back())) {
+      throw ws::Error(posed.files.back().string() +
+                      " is missing; give the folder that the names of "
+                      "the " +
+                      std::to_string(model->names().size()) + " images in " + rig.calibration +
+                      " begin in.");
+    }
+    ws::Rig one = model->calibrated({i}).rig;
+    rig.limit_fields_of_view(one);
+    posed.views.push_back(one.views.front());
+    all.push_back(i);
+  }
+  posed.selection = {model, &model->selection()};
+  posed.distances = [model, all](const Images& some) {
+    const auto distances = model->distances(some);
+    return distances ? distances : model->distances(all);
+  };
+  return posed;
+}
+
+PosedImages PosedImageSettings::of_trajectory() const {
+  if (!poses.given()) {
+    throw ws::Error(rig.calibration +
+                    " is no COLMAP model, so that the poses of the images are not known; give "
+                    "--poses.");
+  }
+  const int first = rig.views.empty() ? 0 : rig.views.front();
+  const ws::SequenceFrame example = ws::read_sequence(images, {first}).front();
+  const cv::Size size = ws::read_image(example.images.front()).size();
+  std::vector<int> cameras = rig.views;
+  if (cameras.empty()) {
+    cameras.resize(ws::read_calibration(rig.calibration, size).rig.views.size());
+    std::iota(cameras.begin(), cameras.end(), 0);
+  }
+  const ChosenFrames chosen = frames.choose(images, cameras);
+  const ws::Rig of_frame = rig.rig_for_images(cameras.size(), size);
+  const std::vector<Eigen::Isometry3d> world_from_rig =
+      poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses;
+  PosedImages posed;
+  posed.origin = world_from_rig.front().translation();
+  for (std::size_t k = 0; k < chosen.chosen.size(); ++k) {
+    const ws::SequenceFrame& frame = chosen.all[chosen.chosen[k]];
+    for (std::size_t i = 0; i < of_frame.views.size(); ++i) {
+      ws::View view = of_frame.views[i];
+      view.name = frame.name + "/" + view.name;
+      view.world_from_camera = world_from_rig[k] * view.world_from_camera;
+      view.world_from_camera.translation() -= posed.origin;
+      posed.views.push_back(std::move(view));
+      posed.files.push_back(frame.images[i]);
+    }
+  }
+  posed.distances = [](const Images&) { return std::nullopt; };
+  return posed;
+}
+
+void PosedImageSettings::apply_masks(PosedImages& posed) const {
+  if (masks.empty()) return;
+  if (!fs::is_directory(masks)) {
+    throw ws::Error(masks + " is no folder; give the one that holds NAME.png for the image NAME.");
+  }
+  for (ws::View& view : posed.views) {
+    const fs::path mask = fs::path(masks) / (view.name + ".png");
+    if (!fs::exists(mask)) continue;
+    view.mask = ws::to_intensity(ws::read_image(mask), mask.string()) > 0;
+    ws::require_calibrated_size(view.mask, view, mask.string());
+  }
+}
+
+void PosedImageSettings::leave_out_dark_rims(PosedImages& posed) const {
+  std::vector<bool> done(posed.views.size());
+  for (std::size_t first = 0; first < posed.views.size(); ++first) {
+    if (done[first]) continue;
+    const ws::Camera camera = posed.views[first].camera;
+    Images of_camera;
+    for (std::size_t i = first; i < posed.views.size(); ++i) {
+      if (posed.views[i].camera == camera) of_camera.push_back(i);
+    }
+    ws::Rig sample;
+    std::vector<cv::Mat> seen;
+    const std::size_t count = std::min(rim_images, of_camera.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t image = of_camera[i * of_camera.size() / count];
+      sample.views.push_back(posed.views[image]);
+      seen.push_back(posed.read(image));
+    }
+    rig.leave_out_dark_rims(sample, seen);
+    for (const std::size_t i : of_camera) {
+      done[i] = true;
+      posed.views[i].camera.max_theta = sample.views.front().camera.max_theta;
+    }
+  }
+}

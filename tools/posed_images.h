@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// Many images of one scene whose cameras and poses are known: those of a COLMAP model, or of a rig
+// that moves along a trajectory.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "frame_settings.h"
+#include "match_settings.h"
+#include "pose_settings.h"
+#include "rig_settings.h"
+#include "widestereo/colmap.h"
+#include "widestereo/view_selection.h"
+
+/// By their numbers.
+using Images = std::vector<std::size_t>;
+
+struct PosedImages {
+  std::vector<widestereo::View> views;  ///< named as their results are; with masks
+  std::vector<std::filesystem::path> files;
+  std::shared_ptr<const widestereo::ViewSelection> selection;
+  /// That some images have by what is known of the scene; nothing for options to be taken.
+  std::function<std::optional<widestereo::DistanceRange>(const Images&)> distances;
+  bool in_metres = true;
+  /// Of the frame of the views, in that of the trajectory, metres: coordinates stay small.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+
+  /// Throws Error unless it has the calibrated size.
+  cv::Mat read(std::size_t image) const;
+};
+
+struct PosedImageSettings {
+  std::string images;  ///< folder of a model's images, or a data set
+  RigSettings rig;
+  std::string masks;  ///< folder with NAME.png for the image NAME
+  PoseSettings poses;
+  FrameSettings frames;
+
+  /// Adds all these options.
+  void add_to(CLI::App& command);
+  /// Reads what is known of the images; `options` say how far a scene without known points reaches.
+  PosedImages read(const widestereo::Options& options) const;
+
+ private:
+  PosedImages of_colmap() const;
+  PosedImages of_trajectory() const;
+  void apply_masks(PosedImages& images) const;
+  void leave_out_dark_rims(PosedImages& images) const;
+};
