@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The few GLSL vector types and functions that the kernels use, for C++ and CUDA.
-// Included inside a namespace by portable.h; FN is the function qualifier.
+// Included inside a namespace by src/kernel/host.h; FN is the function qualifier.
 
 template <class T>
 struct Vector2 {

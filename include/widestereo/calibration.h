@@ -17,9 +17,10 @@ struct Calibration {
 };
 
 /// Reads a Kalibr camchain YAML, a Basalt JSON or an OpenCV FileStorage (YAML, XML or JSON; fisheye
-/// stereo or omnidir) and validates it. Sizes come from the file; OpenCV files without an image
-/// size take `image_size` (pixels), which is otherwise ignored when empty and checked when given.
-/// Throws Error naming the file, the key and the remedy.
+/// stereo or omnidir) and validates it. Sizes come from the file; an OpenCV file without an image
+/// size takes `image_size` (pixels), and one of another size is refused. The other formats ignore
+/// `image_size`, as each of their cameras has a size of its own. Throws Error naming the file, the
+/// key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
 /// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg

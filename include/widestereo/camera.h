@@ -63,7 +63,8 @@ bool project(const Camera& camera, const Eigen::Vector3d& point, Eigen::Vector2d
              Eigen::Matrix<double, 2, 3>& jacobian);
 
 /// Unit viewing ray of a pixel, which may lie outside the image and between pixel centres.
-/// Closed form, or Newton to better than 1e-6 px. Returns false when the pixel has no ray within
+/// Closed form or Newton; the ray projects back to within 1e-6 px, and as much again for each 1000
+/// px between the pixel and the image's origin. Returns false when the pixel has no such ray within
 /// the model's domain and the field of view; `ray` is unspecified then.
 bool unproject(const Camera& camera, const Eigen::Vector2d& pixel, Eigen::Vector3d& ray);
 

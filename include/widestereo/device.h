@@ -60,7 +60,7 @@ class Device {
   /// Messages of the validation layers so far (errors and warnings).
   std::vector<std::string> validation_messages() const;
 
-  class Implementation;  // src/matching/device_implementation.h
+  class Implementation;  // src/matching/backend.h
   explicit Device(std::unique_ptr<Implementation> implementation);
   Implementation& implementation() const { return *implementation_; }
 

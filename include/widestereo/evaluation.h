@@ -127,7 +127,7 @@ std::string to_json(const std::vector<SparsificationPoint>& curve);
 /// How often pixels of about the same confidence are right: displaced by at most 2 px in the
 /// source.
 struct ReliabilityBin {
-  double low = 0, high = 1;  ///< confidence: low <= c < high
+  double low = 0, high = 1;  ///< confidence: low <= c < high, 1 itself in the last one
   long pixels = 0;
   double mean_confidence = 0;
   double right = 0;  ///< share of the pixels

@@ -68,7 +68,9 @@ struct Options {
   int second_iterations = 8;  ///< of every further view, started from the first one's planes, >= 0
   int refinements =
       4;  ///< random perturbations per pixel and iteration, 0..16; range halved each time
-  int best_sources = 1;  ///< cost = mean of this many best source views, >= 1
+  /// Cost = mean over this many of the source views that see the patch, best first, or over all of
+  /// them if they are fewer; 1..8.
+  int best_sources = 1;
   PatchPattern pattern = PatchPattern::dense;
   /// Weight (1 + |difference| / (8 scale))^-8, about exp(-|difference| / scale), of a sample whose
   /// intensity differs from the centre's, grey levels of 255; 0 = all weigh the same.

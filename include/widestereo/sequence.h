@@ -17,9 +17,10 @@ struct SequenceFrame {
   std::optional<std::int64_t> nanoseconds;    ///< time stamp, where the data set has them
 };
 
-/// Nanoseconds since 1970 that the last number in a file's name without extension stands for, by
-/// its digits (before a point): seconds (10), milliseconds (13), microseconds (16) or nanoseconds
-/// (19). Nothing for other numbers, nor for counters, which start with 0.
+/// Nanoseconds since 1970 that the number at the end of a file's name without extension stands for,
+/// by its digits (before a point): seconds (10), milliseconds (13), microseconds (16) or
+/// nanoseconds (19). Nothing for other numbers, nor for counters, which start with 0, nor where
+/// something follows the number.
 std::optional<std::int64_t> time_in_name(const std::string& name);
 
 /// Frames of a data set in the order of time, for these cameras. Layouts: FOLDER/camN/ with images,
