@@ -95,7 +95,8 @@ void add_depth_command(CLI::App& app) {
   command
       ->add_option("--sources", arguments->sources,
                    "How many others of the model join one image, best first (default " +
-                       std::to_string(default_sources) + ")")
+                       std::to_string(default_sources) +
+                       "; with the three levels of quality and fast 4 at most)")
       ->check(CLI::Range(1, most_images - 1));
   arguments->sharpness.add_to(*command);
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();

@@ -14,7 +14,6 @@
 namespace widestereo {
 namespace {
 
-constexpr std::size_t most_views = 8;
 constexpr int all_neighbours = 15;
 constexpr int left_and_up = 1 | 4;
 constexpr int right_and_down = 2 | 8;
@@ -105,13 +104,9 @@ class Builder {
   Builder(const Rig& rig, const Options& options) : options_(options) {
     const bool is_pyramid = options.search == SearchMethod::pyramid;
     levels_ = is_pyramid ? options.levels : 1;
+    require_few_enough(rig.views.size());
     views_of_rig_ = static_cast<int>(rig.views.size());
     schedule_.views = pyramid(rig, levels_);
-    if (schedule_.views.size() > MAX_VIEWS) {
-      throw Error("The rig has " + std::to_string(views_of_rig_) + " views, too many for " +
-                  std::to_string(levels_) + " levels (" + std::to_string(MAX_VIEWS) +
-                  " in all); choose fewer views or levels.");
-    }
     for (const View& view : schedule_.views) {
       if (view.camera.width < 2 || view.camera.height < 2) {
         throw Error("The image of " + view.name + " is too small for " + std::to_string(levels_) +
@@ -151,6 +146,20 @@ class Builder {
   }
 
  private:
+  /// Kernels number the views of all levels together.
+  void require_few_enough(std::size_t views) const {
+    const std::size_t most = static_cast<std::size_t>(MAX_VIEWS / levels_);
+    if (views <= most) return;
+    const std::size_t levels_for_all = MAX_VIEWS / views;
+    throw Error("The rig has " + std::to_string(views) + " views, but " + std::to_string(levels_) +
+                " pyramid level(s) allow " + std::to_string(most) + " (views times levels may be " +
+                std::to_string(MAX_VIEWS) + "); match fewer images" +
+                (levels_for_all > 0 ? ", or choose --levels " + std::to_string(levels_for_all) +
+                                          " with as many --level-iterations and "
+                                          "--level-regressions."
+                                    : "."));
+  }
+
   Schedule finished() {
     check_and_fill(options_.ambiguity_margin > 0 ? other_places : 0, options_.fill_radius,
                    reason_no_ray);
@@ -448,9 +457,9 @@ class Builder {
 };
 
 void require_usable(const Rig& rig, const Options& options) {
-  if (rig.views.size() < 2 || rig.views.size() > MAX_VIEWS) {
-    throw Error("The rig has " + std::to_string(rig.views.size()) + " view(s); stereo needs 2 to " +
-                std::to_string(MAX_VIEWS) + ".");
+  if (rig.views.size() < 2) {
+    throw Error("The rig has " + std::to_string(rig.views.size()) +
+                " view(s); stereo needs 2 or more.");
   }
   validate(rig, "The rig");
   validate(options);

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#include "schedule/schedule.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "error_of.h"
+#include "kernel_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+Rig rig_of(std::size_t count) {
+  Rig rig = fisheye_rig(64);
+  while (rig.views.size() < count) {
+    View view = rig.views.back();
+    view.world_from_camera.translation().x() += 0.1;
+    rig.views.push_back(view);
+  }
+  return rig;
+}
+
+TEST(ViewLimit, CountsTheViewsOfAllLevels) {
+  const Options three_levels = Options::preset_named("quality");
+  EXPECT_EQ(make_schedule(rig_of(5), three_levels).views.size(), 15u);
+  EXPECT_THAT(error_of([&] { make_schedule(rig_of(6), three_levels); }),
+              AllOf(HasSubstr("6 views, but 3 pyramid level(s) allow 5"), HasSubstr("fewer images"),
+                    HasSubstr("--levels 2 ")));
+  EXPECT_NE(error_of([&] { make_warm_schedule(rig_of(6), three_levels); }), "");
+  const Options one_level = Options::preset_named("paper");
+  EXPECT_EQ(make_schedule(rig_of(16), one_level).views.size(), 16u);
+  EXPECT_THAT(error_of([&] { make_schedule(rig_of(17), one_level); }),
+              AllOf(HasSubstr("17 views, but 1 pyramid level(s) allow 16"),
+                    ::testing::Not(HasSubstr("--levels"))));
+  Rig one = rig_of(2);
+  one.views.pop_back();
+  EXPECT_THAT(error_of([&] { make_schedule(one, one_level); }), HasSubstr("1 view(s)"));
+}
+
+}  // namespace
+}  // namespace widestereo::test
