@@ -64,6 +64,8 @@ class Storage {
     return {};
   }
 
+  [[noreturn]] void fail(const std::string& what) const { document_.fail(what); }
+
  private:
   /// A damaged header must not make OpenCV allocate gigabytes.
   void require_small(const cv::FileNode& node, const char* key) const {
@@ -88,12 +90,21 @@ class Storage {
   cv::FileStorage file_;
 };
 
-/// One camera's keys.
+/// One camera's name and keys.
 struct CameraKeys {
+  const char* name;
   Keys k, d, xi;
 };
 
 constexpr int kannala_brandt_coefficients = 4;
+
+/// If coefficients that the model lacks were dropped, rays would be wrong without a word.
+void require_zero(const Storage& storage, const CameraKeys& keys, const cv::Mat& excess,
+                  const std::string& remedy) {
+  if (cv::countNonZero(excess) == 0) return;
+  storage.fail(std::string(keys.name) + ": The distortion (" + *keys.d.begin() +
+               ") has non-zero coefficients that are not supported; " + remedy);
+}
 
 Camera read_camera(const Storage& storage, const CameraKeys& keys, cv::Size size) {
   const cv::Mat k =
@@ -112,6 +123,8 @@ Camera read_camera(const Storage& storage, const CameraKeys& keys, cv::Size size
   camera.k1 = c(0);
   camera.k2 = c(1);
   if (!xi.empty()) {
+    require_zero(storage, keys, c.colRange(4, c.cols),
+                 "cv::omnidir has four, k1 k2 p1 p2: calibrate with it.");
     camera.model = CameraModel::mei;
     camera.xi = xi.at<double>(0);
     camera.p1 = c(2);
@@ -122,6 +135,9 @@ Camera read_camera(const Storage& storage, const CameraKeys& keys, cv::Size size
     camera.k3 = c(2);
     camera.k4 = c(3);
   } else {
+    require_zero(storage, keys, c.colRange(5, c.cols),
+                 "calibrate with k1 k2 p1 p2 k3 alone, without CALIB_RATIONAL_MODEL, "
+                 "CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL.");
     camera.model = CameraModel::pinhole_radtan;
     camera.p1 = c(2);
     camera.p2 = c(3);
@@ -167,7 +183,8 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     rig.views[0].name = "cam0";
     rig.views[1].name = "cam1";
     rig.views[0].camera = read_camera(storage,
-                                      {{"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
+                                      {"cam0",
+                                       {"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
                                         "camera_matrix_left", "K", "camera_matrix"},
                                        {"D1", "distCoeffs1", "dist_coeffs_1", "D_left",
                                         "distortion_left", "D", "distortion_coefficients"},
@@ -183,7 +200,8 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     }
     rig.views[1].camera = read_camera(
         storage,
-        {{"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
+        {"cam1",
+         {"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
          {"D2", "distCoeffs2", "dist_coeffs_2", "D_right", "distortion_right"},
          {"xi2", "xi_right"}},
         size);

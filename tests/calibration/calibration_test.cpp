@@ -286,6 +286,34 @@ TEST(OpenCv, ReadsOmnidir) {
   EXPECT_EQ(c.p2, -0.002);
 }
 
+/// What would be dropped must not be there.
+TEST(OpenCv, RefusesCoefficientsThatNoModelHas) {
+  const TemporaryFolder folder;
+  const auto path = folder / "stereo.yml";
+  const auto write = [&](const std::vector<double>& coefficients, bool omnidir) {
+    cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
+    file << "K" << cv::Mat(cv::Matx33d(600, 0, 320, 0, 601, 240, 0, 0, 1));
+    file << "D" << cv::Mat(coefficients, true);
+    if (omnidir) file << "xi" << 1.3;
+    file << "image_width" << 640 << "image_height" << 480;
+  };
+  for (const std::size_t count : {5u, 8u, 12u, 14u}) {
+    std::vector<double> coefficients(count);
+    coefficients[4] = 0.3;
+    write(coefficients, false);
+    EXPECT_EQ(read_calibration(path).rig.views[0].camera.k3, 0.3) << count;
+    if (count == 5) continue;
+    coefficients.back() = 0.01;
+    write(coefficients, false);
+    EXPECT_NE(error_of(path).find("CALIB_"), std::string::npos) << error_of(path);
+    EXPECT_NE(error_of(path).find("cam0"), std::string::npos) << error_of(path);
+  }
+  write({-0.2, 0.05, 0.001, -0.002, 0}, true);
+  EXPECT_EQ(read_calibration(path).rig.views[0].camera.p2, -0.002);
+  write({-0.2, 0.05, 0.001, -0.002, 0.1}, true);
+  EXPECT_NE(error_of(path).find("cv::omnidir"), std::string::npos) << error_of(path);
+}
+
 TEST(Writing, RoundTripsExactly) {
   const TemporaryFolder folder;
   Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
