@@ -16,7 +16,8 @@ struct SynthesisedView {
 
 /// `distance`: CV_32FC1, metres along the rays of `view` (<= 0 or non-finite: none); `other_image`:
 /// CV_8UC1, grey levels. A point is hidden when another one that lands within 2 pixels of it is
-/// nearer to the other camera by more than 5 %.
+/// nearer to the other camera by more than 5 %. Throws Error for other types and sizes than those
+/// of the calibration.
 SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
                                 const cv::Mat& other_image, const View& other);
 
@@ -30,8 +31,8 @@ struct SynthesisScores {
   double above_0_7 = 0, above_0_8 = 0, above_0_9 = 0;  ///< shares of them
 };
 
-/// `image`: CV_8UC1, grey levels, of the view that was synthesised from `distance`. Throws Error
-/// for maps of different sizes.
+/// `image`: CV_8UC1, grey levels, of the view that was synthesised from `distance`, CV_32FC1.
+/// Throws Error for maps of other types or of different sizes.
 SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
                                  const SynthesisedView& synthesised);
 

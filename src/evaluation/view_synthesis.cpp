@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/distance.h"
@@ -26,12 +27,20 @@ cv::Mat window_mean(const cv::Mat& map) {
   return mean;
 }
 
+void require_type(const cv::Mat& map, int type, const std::string& name) {
+  if (map.type() == type) return;
+  throw Error(name + " is " + cv::typeToString(map.type()) + " instead of " +
+              cv::typeToString(type) + "; convert it.");
+}
+
 }  // namespace
 
 SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
                                 const cv::Mat& other_image, const View& other) {
   require_calibrated_size(distance, view, "The distance map of " + view.name);
   require_calibrated_size(other_image, other, "The image of " + other.name);
+  require_type(distance, CV_32FC1, "The distance map of " + view.name);
+  require_type(other_image, CV_8UC1, "The image of " + other.name);
   const Eigen::Isometry3d motion = source_from_reference(other, view);
   const cv::Size size = distance.size();
   cv::Mat_<cv::Point2f> places(size, cv::Point2f(-1, -1));
@@ -79,11 +88,15 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
 SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
                                  const SynthesisedView& synthesised) {
   const cv::Size size = synthesised.image.size();
-  if (image.size() != size || distance.size() != size) {
+  if (image.size() != size || distance.size() != size || synthesised.visible.size() != size) {
     throw Error(
         "A synthesised view, its distances and the image to compare differ in size; use "
         "maps of one view.");
   }
+  require_type(distance, CV_32FC1, "The distance map");
+  require_type(image, CV_8UC1, "The image to compare");
+  require_type(synthesised.image, CV_32FC1, "The image of the synthesised view");
+  require_type(synthesised.visible, CV_8UC1, "The map of what the synthesised view shows");
   cv::Mat seen, a, b;
   synthesised.visible.convertTo(seen, CV_64F, 1 / 255.0);
   image.convertTo(a, CV_64F);

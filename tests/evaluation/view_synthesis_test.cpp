@@ -68,5 +68,36 @@ TEST_F(ViewSynthesis, NeedsMapsOfTheCalibratedSize) {
               ::testing::HasSubstr("distance map of cam0 is 8x9 pixels"));
 }
 
+TEST_F(ViewSynthesis, NeedsMapsOfTheDocumentedTypes) {
+  using ::testing::HasSubstr;
+  const View& view = pair.rig.views[0];
+  const View& other = pair.rig.views[1];
+  const cv::Mat image = grey(pair.views[0]);
+  const auto synthesise = [&](const cv::Mat& distance, const cv::Mat& of_other) {
+    return error_of([&] { synthesise_view(distance, view, of_other, other); });
+  };
+  EXPECT_THAT(synthesise(cv::Mat(256, 256, CV_32FC3, cv::Scalar(1)), image),
+              HasSubstr("distance map of cam0 is CV_32FC3 instead of CV_32FC1"));
+  EXPECT_THAT(synthesise(cv::Mat(256, 256, CV_64FC1, cv::Scalar(1)), image), HasSubstr("CV_64FC1"));
+  EXPECT_THAT(synthesise(truth, pair.views[1].image),
+              HasSubstr("image of cam1 is CV_8UC3 instead of CV_8UC1"));
+  const SynthesisedView good = synthesise_view(truth, view, image, other);
+  const auto score = [&](const cv::Mat& distance, const cv::Mat& of_view,
+                         const SynthesisedView& synthesised) {
+    return error_of([&] { synthesis_scores(distance, of_view, synthesised); });
+  };
+  EXPECT_EQ(score(truth, image, good), "");
+  cv::Mat wide;
+  truth.convertTo(wide, CV_64F);
+  EXPECT_THAT(score(wide, image, good), HasSubstr("CV_64FC1"));
+  EXPECT_THAT(score(truth, pair.views[0].image, good), HasSubstr("CV_8UC3"));
+  EXPECT_THAT(score(truth, image, {.image = good.visible, .visible = good.visible}),
+              HasSubstr("CV_8UC1 instead of CV_32FC1"));
+  EXPECT_THAT(score(truth, image, {.image = good.image, .visible = good.image}),
+              HasSubstr("CV_32FC1 instead of CV_8UC1"));
+  EXPECT_THAT(score(truth, image, {.image = good.image, .visible = good.visible.rowRange(0, 9)}),
+              HasSubstr("differ in size"));
+}
+
 }  // namespace
 }  // namespace widestereo::test
