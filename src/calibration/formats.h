@@ -28,8 +28,8 @@ void set_unified_from_alpha(Camera& camera, double alpha);
 /// alpha = xi / (1 + xi); the focal length of the alpha form is f_xi / (1 + xi).
 double unified_alpha(const Camera& camera);
 
-/// Rotation (nearly orthonormal by rounding) and translation as a rigid motion; fails when it is
-/// not one.
+/// The rotation nearest to a matrix (orthonormal but for rounding) and a translation as a rigid
+/// motion; fails when they are not one.
 Eigen::Isometry3d rigid(const Document& document, const std::string& what,
                         const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
 

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "calibration/formats.h"
+#include "geometry/validation.h"
 #include "widestereo/colmap.h"
 #include "widestereo/error.h"
 
@@ -25,16 +26,14 @@ double unified_alpha(const Camera& camera) { return camera.xi / (1 + camera.xi);
 
 Eigen::Isometry3d rigid(const Document& document, const std::string& what,
                         const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
-  const bool orthonormal =
-      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() < 1e-3 &&
-      rotation.determinant() > 0;
-  if (!rotation.allFinite() || !translation.allFinite() || !orthonormal) {
+  if (!rotation.allFinite() || !translation.allFinite() || !is_rotation(rotation)) {
     document.fail(what +
                   " is not a rigid motion; its rotation must be orthonormal with determinant +1 "
                   "and all numbers finite.");
   }
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.linear() = rotation;
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  motion.linear() = svd.matrixU() * svd.matrixV().transpose();
   motion.translation() = translation;
   return motion;
 }

@@ -48,17 +48,19 @@ void require_finite(const Camera& c, const std::string& name) {
 }
 
 void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
-  const Eigen::Matrix3d r = pose.linear();
-  if (pose.matrix().allFinite() &&
-      (r.transpose() * r - Eigen::Matrix3d::Identity()).norm() <= 1e-4 && r.determinant() > 0) {
-    return;
-  }
+  if (pose.matrix().allFinite() && is_rotation(pose.linear())) return;
   throw Error(name +
               ": the pose is not a rigid motion; its rotation must be orthonormal with "
               "determinant +1 and all entries finite.");
 }
 
 }  // namespace
+
+bool is_rotation(const Eigen::Matrix3d& matrix) {
+  constexpr double rounding = 3.1e-4;  // 2 * 3 * 0.5e-4, and what is of second order
+  return (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).norm() <= rounding &&
+         matrix.determinant() > 0;
+}
 
 void validate(const Camera& c, const std::string& name) {
   require(c.width >= 2 && c.width <= largest_side, name, "the image width", c.width,

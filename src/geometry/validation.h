@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
 #include "widestereo/camera.h"
 
 namespace widestereo {
+
+/// Whether a matrix is a rotation, but for entries rounded to four digits.
+bool is_rotation(const Eigen::Matrix3d& matrix);
 
 /// Throws Error unless `mask` is empty or CV_8UC1 of the camera's size. `name` begins the message.
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name);

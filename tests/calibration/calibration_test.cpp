@@ -314,6 +314,34 @@ TEST(OpenCv, RefusesCoefficientsThatNoModelHas) {
   EXPECT_NE(error_of(path).find("cv::omnidir"), std::string::npos) << error_of(path);
 }
 
+/// Readers make a rotation of what was rounded.
+TEST(Rotations, MayBeWrittenWithFourDigits) {
+  const TemporaryFolder folder;
+  const Eigen::Matrix3d exact =
+      Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Eigen::Matrix3d rounded = (exact * 1e4).array().round() / 1e4;
+  EXPECT_GT((rounded.transpose() * rounded - Eigen::Matrix3d::Identity()).norm(), 1e-4);
+  std::ostringstream rows, list;
+  for (int i = 0; i < 3; ++i) {
+    rows << "  - [" << rounded(i, 0) << ", " << rounded(i, 1) << ", " << rounded(i, 2)
+         << ", 0.1]\n";
+    for (int j = 0; j < 3; ++j) list << (i + j > 0 ? ", " : "") << rounded(i, j);
+  }
+  const std::string kalibr = kalibr_text;
+  const std::size_t first = kalibr.find("  - [0.99999"), last = kalibr.find("  - [0.0, 0.0, 0.0");
+  const std::string kalibr_rounded = kalibr.substr(0, first) + rows.str() + kalibr.substr(last);
+  const std::string opencv_rounded =
+      replaced(opencv_text, "1., 0., 0., 0., 1., 0., 0., 0., 1.", list.str());
+  for (const std::string& text : {kalibr_rounded, opencv_rounded}) {
+    const auto path = folder.write("rounded.yaml", text);
+    ASSERT_EQ(error_of(path), "");
+    const Rig rig = read_calibration(path).rig;
+    const Eigen::Matrix3d read = source_from_reference(rig.views[1], rig.views[0]).linear();
+    EXPECT_LT((read - exact).norm(), 2e-4);
+    EXPECT_LT((read.transpose() * read - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+  }
+}
+
 TEST(Writing, RoundTripsExactly) {
   const TemporaryFolder folder;
   Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
