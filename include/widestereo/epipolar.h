@@ -32,8 +32,8 @@ struct EpipolarReport {
 /// SIFT features matched mutually with a ratio test; both images 8 or 16 bit. Throws Error.
 std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& second);
 
-/// Scores matches between two calibrated views, those on masked pixels left out. Throws Error when
-/// there are fewer than 8.
+/// Scores matches between two calibrated views, those on masked pixels and at the epipole left out.
+/// Throws Error when there are fewer than 8 or the views share a centre.
 EpipolarReport check_epipolar(const View& first, const View& second,
                               const std::vector<PixelMatch>& matches);
 

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/angle.h"
+#include "geometry/validation.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -18,6 +19,7 @@ namespace {
 
 constexpr double ratio = 0.8;
 constexpr std::size_t fewest_matches = 8;
+constexpr double at_epipole = 1e-6;  // radians
 constexpr double degrees = 180 / std::numbers::pi;
 
 struct Features {
@@ -81,6 +83,7 @@ std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& seco
 
 EpipolarReport check_epipolar(const View& first, const View& second,
                               const std::vector<PixelMatch>& matches) {
+  require_baseline(first, second, "The epipolar check");
   const Eigen::Isometry3d motion = source_from_reference(second, first);
   const Eigen::Vector3d epipole = motion.translation();
   std::vector<double> pixels;
@@ -95,8 +98,10 @@ EpipolarReport check_epipolar(const View& first, const View& second,
       continue;
     }
     const Eigen::Vector3d rotated = motion.linear() * ray_first;
-    const Eigen::Vector3d plane = epipole.cross(rotated).normalized();
-    if (!plane.allFinite()) continue;
+    const Eigen::Vector3d normal = epipole.cross(rotated);
+    // A ray to the epipole lies in every epipolar plane.
+    if (!(normal.norm() > at_epipole * epipole.norm())) continue;
+    const Eigen::Vector3d plane = normal.normalized();
     const double offset = plane.dot(ray_second);
     Eigen::Vector2d foot;
     if (!project(second.camera, ray_second - offset * plane, foot)) continue;

@@ -101,6 +101,12 @@ void validate(const Camera& c, const std::string& name) {
   }
 }
 
+void require_baseline(const View& a, const View& b, const std::string& name) {
+  if (has_baseline(a.world_from_camera.translation(), b.world_from_camera.translation())) return;
+  throw Error(name + ": " + a.name + " and " + b.name +
+              " have the same centre; stereo needs a baseline.");
+}
+
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name) {
   if (mask.empty()) return;
   if (mask.type() == CV_8UC1 && mask.cols == camera.width && mask.rows == camera.height) return;
@@ -121,12 +127,7 @@ void validate(const Rig& rig, const std::string& name) {
   if (rig.world_from_imu) require_rigid(*rig.world_from_imu, name + ": IMU");
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.views.size(); ++j) {
-      if (has_baseline(rig.views[i].world_from_camera.translation(),
-                       rig.views[j].world_from_camera.translation())) {
-        continue;
-      }
-      throw Error(name + ": " + rig.views[i].name + " and " + rig.views[j].name +
-                  " have the same centre; stereo needs a baseline.");
+      require_baseline(rig.views[i], rig.views[j], name);
     }
   }
 }

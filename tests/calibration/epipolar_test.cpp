@@ -8,6 +8,7 @@
 #include <random>
 
 #include "data_folder.h"
+#include "error_of.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -89,6 +90,27 @@ TEST(Epipolar, NeedsMatches) {
   EXPECT_THROW(check_epipolar(rig.views[0], rig.views[1], {}), Error);
   const cv::Mat flat(128, 128, CV_8UC1, cv::Scalar(90));
   EXPECT_TRUE(match_features(flat, flat).empty());
+}
+
+TEST(Epipolar, NeedsABaseline) {
+  const std::vector<PixelMatch> matches = exact_matches(rig_with_rotation_error(0));
+  Rig rig = rig_with_rotation_error(1);
+  rig.views[1].world_from_camera.translation().setZero();
+  EXPECT_NE(test::error_of([&] {
+              check_epipolar(rig.views[0], rig.views[1], matches);
+            }).find("cam0 and cam1 have the same centre"),
+            std::string::npos);
+}
+
+/// Where any ray lies in an epipolar plane.
+TEST(Epipolar, LeavesOutMatchesAtTheEpipole) {
+  const Rig rig = rig_with_rotation_error(0);
+  std::vector<PixelMatch> matches = exact_matches(rig);
+  PixelMatch epipole;
+  ASSERT_TRUE(project(rig.views[0].camera, {1, 0, 0}, epipole.first));
+  epipole.second = epipole.first - Eigen::Vector2d(0, 30);
+  matches.push_back(epipole);
+  EXPECT_EQ(check_epipolar(rig.views[0], rig.views[1], matches).matches, 400);
 }
 
 TEST(Epipolar, RealPairsAreAsGoodAsTheirCalibration) {
