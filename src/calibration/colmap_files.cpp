@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <fstream>
+#include <locale>
 #include <span>
 #include <sstream>
 
@@ -63,6 +64,7 @@ class TextFile {
     if (!std::getline(file_, text_)) return false;
     ++number_;
     line_ = std::istringstream(text_);
+    line_.imbue(std::locale::classic());
     return true;
   }
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "calibration/formats.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -42,11 +43,13 @@ class Block {
   }
 
   double number(const YAML::Node& node, const char* key) const {
-    double value = 0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value)) {
+    // yaml-cpp would read and write numbers by the locale.
+    const std::optional<double> value =
+        node.IsScalar() ? number_of(node.Scalar()) : std::optional<double>();
+    if (!value) {
       fail(std::string("The key ") + key + " holds something that is not a finite number.");
     }
-    return value;
+    return *value;
   }
 
   double number(const char* key) const { return number(node_[key], key); }
@@ -212,6 +215,13 @@ struct KalibrForm {
   std::vector<double> coefficients;
 };
 
+template <class T>
+std::vector<std::string> texts_of(const std::vector<T>& numbers) {
+  std::vector<std::string> texts;
+  for (const T number : numbers) texts.push_back(text_of(number));
+  return texts;
+}
+
 KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
   const Camera& c = view.camera;
   if (c.skew != 0 ||
@@ -251,26 +261,28 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
 
 void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
   YAML::Emitter out;
-  out.SetDoublePrecision(17);
   out << YAML::BeginMap;
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     const View& view = rig.views[i];
     const calibration::KalibrForm form = calibration::kalibr_form(view, path);
     out << YAML::Key << "cam" + std::to_string(i) << YAML::Value << YAML::BeginMap;
     out << YAML::Key << "camera_model" << YAML::Value << form.camera_model;
-    out << YAML::Key << "intrinsics" << YAML::Value << YAML::Flow << form.intrinsics;
+    out << YAML::Key << "intrinsics" << YAML::Value << YAML::Flow
+        << calibration::texts_of(form.intrinsics);
     out << YAML::Key << "distortion_model" << YAML::Value << form.distortion_model;
-    out << YAML::Key << "distortion_coeffs" << YAML::Value << YAML::Flow << form.coefficients;
+    out << YAML::Key << "distortion_coeffs" << YAML::Value << YAML::Flow
+        << calibration::texts_of(form.coefficients);
     out << YAML::Key << "resolution" << YAML::Value << YAML::Flow
-        << std::vector<int>{view.camera.width, view.camera.height};
+        << calibration::texts_of<int>({view.camera.width, view.camera.height});
     if (view.camera.max_theta < std::numbers::pi) {
       out << YAML::Key << "max_theta_deg" << YAML::Value
-          << view.camera.max_theta * 180 / std::numbers::pi;
+          << text_of(view.camera.max_theta * 180 / std::numbers::pi);
     }
     const auto motion = [&out](const char* key, const Eigen::Matrix4d& t) {
       out << YAML::Key << key << YAML::Value << YAML::BeginSeq;
       for (int row = 0; row < 4; ++row) {
-        out << YAML::Flow << std::vector<double>{t(row, 0), t(row, 1), t(row, 2), t(row, 3)};
+        out << YAML::Flow
+            << calibration::texts_of<double>({t(row, 0), t(row, 1), t(row, 2), t(row, 3)});
       }
       out << YAML::EndSeq;
     };

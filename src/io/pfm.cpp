@@ -7,8 +7,8 @@
 #include <cstring>
 #include <fstream>
 #include <opencv2/core.hpp>
-#include <sstream>
 
+#include "text/number.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -30,10 +30,9 @@ std::string next_word(const std::vector<uchar>& bytes, std::size_t& position) {
   return word;
 }
 
-double to_number(const std::string& word) {
-  std::istringstream stream(word);
-  double number = 0;
-  return stream >> number && stream.eof() ? number : std::nan("");
+/// Likewise, NaN if it is none.
+double next_number(const std::vector<uchar>& bytes, std::size_t& position) {
+  return number_of(next_word(bytes, position)).value_or(std::nan(""));
 }
 
 }  // namespace
@@ -41,9 +40,9 @@ double to_number(const std::string& word) {
 cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& bytes) {
   std::size_t position = 0;
   const std::string kind = next_word(bytes, position);
-  const double width = to_number(next_word(bytes, position));
-  const double height = to_number(next_word(bytes, position));
-  const double scale = to_number(next_word(bytes, position));
+  const double width = next_number(bytes, position);
+  const double height = next_number(bytes, position);
+  const double scale = next_number(bytes, position);
   const bool good_size = width >= 1 && height >= 1 && width <= largest_side &&
                          height <= largest_side && width == std::floor(width) &&
                          height == std::floor(height);
@@ -69,7 +68,8 @@ cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& by
 
 void write_pfm(const std::filesystem::path& path, const cv::Mat& map) {
   std::ofstream file(path, std::ios::binary);
-  file << (map.channels() == 3 ? "PF" : "Pf") << "\n" << map.cols << " " << map.rows << "\n-1.0\n";
+  file << (map.channels() == 3 ? "PF" : "Pf") << "\n"
+       << text_of(map.cols) << " " << text_of(map.rows) << "\n-1.0\n";
   const auto row_bytes = static_cast<std::streamsize>(map.cols * map.elemSize());
   for (int y = map.rows - 1; y >= 0; --y) {
     file.write(reinterpret_cast<const char*>(map.ptr(y)), row_bytes);

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/distance.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -88,7 +89,7 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
     std::ofstream file(temporary, std::ios::binary);
     file << "ply\nformat binary_little_endian 1.0\n"
          << "comment world frame and unit of the calibration\n"
-         << "element vertex " << cloud.size() << "\n"
+         << "element vertex " << text_of(cloud.size()) << "\n"
          << "property float x\nproperty float y\nproperty float z\n"
          << "property float nx\nproperty float ny\nproperty float nz\n"
          << "property uchar red\nproperty uchar green\nproperty uchar blue\n"

@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/sequence.h"
 
@@ -86,12 +87,9 @@ class PoseLine {
 
  private:
   double number(const std::string& word, const std::string& where) const {
-    char* end = nullptr;
-    const double value = std::strtod(word.c_str(), &end);
-    if (word.empty() || *end != '\0' || !std::isfinite(value)) {
-      throw Error(where + " is no " + form_ + " of finite numbers.");
-    }
-    return value;
+    const std::optional<double> value = number_of(word);
+    if (!value) throw Error(where + " is no " + form_ + " of finite numbers.");
+    return *value;
   }
 
   double seconds(const std::string& word, const std::string& where) const {

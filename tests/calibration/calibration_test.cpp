@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <random>
 
+#include "comma_locale.h"
 #include "data_folder.h"
 #include "error_of.h"
 #include "temporary_folder.h"
@@ -340,6 +341,35 @@ TEST(Rotations, MayBeWrittenWithFourDigits) {
     EXPECT_LT((read - exact).norm(), 2e-4);
     EXPECT_LT((read.transpose() * read - Eigen::Matrix3d::Identity()).norm(), 1e-12);
   }
+}
+
+TEST(Locales, DoNotChangeNumbers) {
+  const TemporaryFolder folder;
+  const Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  const auto expect_same = [&](const std::filesystem::path& path) {
+    ASSERT_EQ(error_of(path), "");
+    const Rig again = read_calibration(path).rig;
+    EXPECT_EQ(again.views[0].camera, rig.views[0].camera) << path;
+    EXPECT_NEAR(baseline(again.views[0], again.views[1]), baseline(rig.views[0], rig.views[1]),
+                1e-12)
+        << path;
+  };
+  const auto round_trip = [&] {
+    expect_same(folder / "chain.yaml");
+    write_kalibr(folder / "again.yaml", rig);
+    expect_same(folder / "again.yaml");
+    write_basalt(folder / "again.json", rig);
+    expect_same(folder / "again.json");
+    EXPECT_EQ(error_of(folder.write("stereo.yml", opencv_text)), "");
+    EXPECT_EQ(read_calibration(folder / "stereo.yml").rig.views[0].camera.fx, 392.2);
+  };
+  {
+    const test::CommaStreams streams;
+    round_trip();
+  }
+  const test::CommaNumbers numbers;
+  if (!numbers.installed()) GTEST_SKIP() << "no locale with a decimal comma is installed";
+  round_trip();
 }
 
 TEST(Writing, RoundTripsExactly) {

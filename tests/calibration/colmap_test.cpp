@@ -7,6 +7,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
+#include "comma_locale.h"
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
@@ -133,6 +134,15 @@ TEST_F(Colmap, ProjectsWorldPointsLikeOpenCv) {
     EXPECT_NEAR(pixel.x(), expected[i].x, 1e-6);
     EXPECT_NEAR(pixel.y(), expected[i].y, 1e-6);
   }
+}
+
+TEST_F(Colmap, ReadsTextInAnyLocale) {
+  write_text();
+  const test::CommaStreams streams;
+  ASSERT_EQ(error({"left/b.png"}), "");
+  const View view = read({"left/b.png"}).rig.views[0];
+  EXPECT_EQ(view.camera.fx, 900);
+  EXPECT_EQ(view.camera.k1, -0.1);
 }
 
 TEST_F(Colmap, ReadsBinaryFilesAsText) {

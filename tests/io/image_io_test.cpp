@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "comma_locale.h"
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
@@ -46,6 +47,16 @@ TEST(Maps, TiffAndPfmKeepEveryBit) {
       }
     }
   }
+}
+
+TEST(Maps, PfmHeadersDoNotDependOnTheLocale) {
+  const TemporaryFolder folder;
+  const cv::Mat wide(2, 1234, CV_32FC1, cv::Scalar(2));
+  write_map(folder / "before.pfm", wide);
+  const test::CommaStreams streams;
+  EXPECT_EQ(read_map(folder / "before.pfm").size(), wide.size());
+  write_map(folder / "after.pfm", wide);
+  EXPECT_EQ(bytes_of(folder / "after.pfm"), bytes_of(folder / "before.pfm"));
 }
 
 TEST(Maps, FilesHoldXYZInThisOrder) {

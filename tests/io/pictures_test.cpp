@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "comma_locale.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -149,6 +150,15 @@ TEST(PointCloud, PlacesPointsInTheWorld) {
   EXPECT_EQ(colour[1], 20);
   EXPECT_EQ(certainty, 0.25f);
   EXPECT_EQ(file.peek(), EOF);
+}
+
+TEST(PointCloud, FilesDoNotDependOnTheLocale) {
+  const test::TemporaryFolder folder;
+  const test::CommaStreams streams;
+  write_ply(folder / "c.ply", PointCloud(1234));
+  std::ifstream file(folder / "c.ply", std::ios::binary);
+  const std::string header{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_NE(header.find("element vertex 1234\n"), std::string::npos);
 }
 
 }  // namespace

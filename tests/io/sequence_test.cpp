@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "comma_locale.h"
 #include "error_of.h"
 #include "temporary_folder.h"
 
@@ -182,12 +183,33 @@ TEST_F(Trajectories, GroundTruthOfTheImuGivesPosesOfTheCamera) {
   }
 }
 
+TEST_F(Trajectories, DoNotDependOnTheLocale) {
+  folder_.write("poses.txt", "+1.5 -1.25e-1 .5 2. 0 0 0 1\n");
+  const auto expect = [&] {
+    ASSERT_EQ(error_of([&] { read_trajectory(folder_ / "poses.txt"); }), "");
+    const StampedPose pose = read_trajectory(folder_ / "poses.txt").poses.front();
+    EXPECT_EQ(pose.seconds, 1.5);
+    EXPECT_EQ(pose.world_from_body.translation(), Eigen::Vector3d(-0.125, 0.5, 2));
+  };
+  expect();
+  {
+    const CommaStreams streams;
+    expect();
+  }
+  const CommaNumbers numbers;
+  if (!numbers.installed()) GTEST_SKIP() << "no locale with a decimal comma is installed";
+  expect();
+}
+
 TEST_F(Trajectories, BrokenLinesAreNamed) {
   EXPECT_THAT(error_of([&] { read_trajectory(folder_ / "none.txt"); }), HasSubstr("none.txt"));
   EXPECT_THAT(error_of_text("# nothing\n"), HasSubstr("no poses"));
   EXPECT_THAT(error_of_text("#\n1 2 3 4 0 0 0\n"), HasSubstr("line 2 has 7 numbers"));
   EXPECT_THAT(error_of_text("1 2 3 4 0 0 0 1 5\n"), HasSubstr("line 1"));
-  EXPECT_THAT(error_of_text("1 2 nan 4 0 0 0 1\n"), HasSubstr("finite"));
+  for (const char* no_number : {"nan", "inf", "1e999", "+-5", "+", "0x10", "5m"}) {
+    EXPECT_THAT(error_of_text("1 2 " + std::string(no_number) + " 4 0 0 0 1\n"),
+                HasSubstr("finite"));
+  }
   EXPECT_THAT(error_of_text("1 2 3,4 4 0 0 0 1\n"), HasSubstr("line 1"));
   EXPECT_THAT(error_of_text("1 2 3 4 1 1 0 1\n"), HasSubstr("quaternion"));
 }
