@@ -47,6 +47,7 @@ struct Panel {
   cv::Mat picture;  ///< 8 or 16 bit, grey or colour
 };
 /// Panels side by side, `columns` in a row, each scaled to the width of the first and titled.
+/// Throws Error where there are none or no columns.
 cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns);
 
 }  // namespace widestereo

@@ -11,6 +11,7 @@
 
 #include "geometry/distance.h"
 #include "statistics/percentile.h"
+#include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
@@ -219,6 +220,10 @@ cv::Mat with_reason_legend(const cv::Mat& picture) {
 }
 
 cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
+  if (panels.empty() || columns < 1) {
+    throw Error("A sheet of " + std::to_string(panels.size()) + " panels in " +
+                std::to_string(columns) + " columns is empty; give one or more of both.");
+  }
   const int width = panels.front().picture.cols;
   const double scale = std::max(0.45, width / 700.0);
   const int title = static_cast<int>(36 * scale);

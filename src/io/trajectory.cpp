@@ -166,6 +166,7 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
     for (const std::size_t i : chosen) poses.push_back(trajectory[i].world_from_body);
     return poses;
   }
+  if (trajectory.empty()) throw Error("There are no poses in " + name + ".");
   for (const std::size_t i : chosen) {
     const SequenceFrame& frame = frames[i];
     const double seconds = static_cast<double>(*frame.nanoseconds) * 1e-9;

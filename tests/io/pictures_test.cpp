@@ -108,6 +108,8 @@ TEST(Pictures, SheetHoldsAllPanels) {
   EXPECT_GT(sheet.cols, 160);
   EXPECT_GT(sheet.rows, 100);
   EXPECT_EQ(sheet.type(), CV_8UC3);
+  EXPECT_THROW(panel_sheet({}, 2), Error);
+  EXPECT_THROW(panel_sheet({{"a", grey}}, 0), Error);
 }
 
 TEST(PointCloud, PlacesPointsInTheWorld) {

@@ -265,6 +265,8 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
               }),
               HasSubstr("frame late"));
   EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
+  EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, {}, 0.01, "p"); }),
+              HasSubstr("no poses in p"));
 }
 
 }  // namespace
