@@ -70,12 +70,27 @@ bool contains(const Document& document, const char* text) {
   return document.text.find(text) != std::string::npos;
 }
 
+/// Formats of polynomial lens models, each told by a word of its own.
+void refuse_polynomials(const Document& document) {
+  constexpr std::pair<const char*, const char*> words[] = {{"ocam_model", "an OCam"},
+                                                           {"Camera.nrpol", "an OCam"},
+                                                           {"unprojection:", "an OCam"},
+                                                           {"\"radial_poly\"", "a WoodScape"}};
+  for (const auto& [word, owner] : words) {
+    if (!contains(document, word)) continue;
+    document.fail(std::string("It is ") + owner +
+                  " calibration, whose polynomial model is not supported; calibrate the lens with "
+                  "Kalibr, Basalt or OpenCV.");
+  }
+}
+
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
   if (contains(document, "opencv-matrix") || contains(document, "<opencv_storage")) {
     return CalibrationFormat::opencv;
   }
+  refuse_polynomials(document);
   if (document.text[first] == '{') return CalibrationFormat::basalt;
   if (contains(document, "camera_model") || contains(document, "cam0:")) {
     return CalibrationFormat::kalibr;
