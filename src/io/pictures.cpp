@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/distance.h"
+#include "io/bgr8.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
 
@@ -96,14 +97,6 @@ cv::Mat with_bar(const cv::Mat& picture, int map,
   return result;
 }
 
-cv::Mat as_bgr8(const cv::Mat& image) {
-  cv::Mat eight;
-  image.convertTo(eight, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1.0);
-  if (eight.channels() == 1) cv::cvtColor(eight, eight, cv::COLOR_GRAY2BGR);
-  if (eight.channels() == 4) cv::cvtColor(eight, eight, cv::COLOR_BGRA2BGR);
-  return eight;
-}
-
 }  // namespace
 
 ColourRange robust_range(const cv::Mat& distance) {
@@ -148,7 +141,7 @@ cv::Mat scalar_picture(const cv::Mat& map, double low, double high) {
 }
 
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
-  cv::Mat picture = as_bgr8(image);
+  cv::Mat picture = to_bgr8(image);
   // The lowest bit that is set shows, but what was filled shows as that.
   for (std::size_t bit = reason_styles.size() - 1; bit-- > 0;) {
     picture.setTo(reason_styles[bit].colour, (reasons & (1 << bit)) != 0);
@@ -231,7 +224,7 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
   std::vector<cv::Mat> pictures;
   int height = 0;
   for (const Panel& panel : panels) {
-    cv::Mat picture = as_bgr8(panel.picture);
+    cv::Mat picture = to_bgr8(panel.picture);
     const double factor = static_cast<double>(width) / picture.cols;
     cv::resize(picture, picture, {width, static_cast<int>(picture.rows * factor)}, 0, 0,
                factor < 1 ? cv::INTER_AREA : cv::INTER_NEAREST);

@@ -4,9 +4,9 @@
 #include <bit>
 #include <fstream>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "geometry/distance.h"
+#include "io/bgr8.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -15,17 +15,6 @@ namespace widestereo {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
-
-/// The image as 8-bit BGR, empty if it is empty.
-cv::Mat to_bgr8(const cv::Mat& image) {
-  if (image.empty()) return {};
-  cv::Mat eight;
-  image.convertTo(eight, CV_8U, image.depth() == CV_16U ? 1 / 257.0 : 1.0);
-  cv::Mat colour = eight;
-  if (eight.channels() == 1) cv::cvtColor(eight, colour, cv::COLOR_GRAY2BGR);
-  if (eight.channels() == 4) cv::cvtColor(eight, colour, cv::COLOR_BGRA2BGR);
-  return colour;
-}
 
 template <class T>
 void append(std::vector<char>& bytes, const T& value) {
