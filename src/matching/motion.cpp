@@ -60,6 +60,13 @@ cv::Vec3f bilinear(const cv::Mat_<cv::Vec3f>& image, const Eigen::Vector2d& at) 
          fy * ((1 - fx) * image(y + 1, x) + fx * image(y + 1, x + 1));
 }
 
+/// The middle value, the upper one of two, where percentile() takes the lower. Reorders the values.
+double upper_median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 /// Accepted points on a regular grid, in the rig's frame.
 std::vector<Point> accepted_points(const View& view, const cv::Mat& rays,
                                    const ViewResult& matched) {
@@ -154,9 +161,7 @@ class Alignment {
     for (const std::vector<Point>& of_view : points_) {
       for (const Point& point : of_view) distances.push_back(point.position.norm());
     }
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-    std::nth_element(distances.begin(), middle, distances.end());
-    return *middle;
+    return upper_median(distances);
   }
 
   std::vector<Row> rows(const std::vector<BlurredView>& views) const {
@@ -201,9 +206,7 @@ class Alignment {
     if (all.empty()) return normals;
     std::vector<double> sizes;
     for (const Row& row : all) sizes.push_back(std::abs(row.residual));
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
-    const double scale = 1.4826 * *middle + 1e-4;
+    const double scale = 1.4826 * upper_median(sizes) + 1e-4;
     normals.variance = scale * scale;
     for (const Row& row : all) {
       // Geman and McClure's weight: what moves by itself or was occluded counts for little.
