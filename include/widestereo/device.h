@@ -29,7 +29,7 @@ struct DeviceInfo {
 
 struct DeviceRequest {
   /// "auto" (the best CUDA device, else the best Vulkan device, else the CPU), "cpu", "cuda",
-  /// "vulkan", and either of the two with ":INDEX", ":NAME PART" or ":UUID".
+  /// "vulkan", and either of the two with ":INDEX", ":NAME PART" or ":UUID"; a number is an index.
   std::string device = "auto";
   bool validation = false;  ///< Vulkan: validation layers with synchronization validation
   std::string

@@ -50,12 +50,27 @@ std::string names_of(const std::vector<DeviceInfo>& devices) {
   return names;
 }
 
-/// `wanted`: what follows "API:", empty for any.
-bool matches(const DeviceInfo& device, const Api& api, const std::string& wanted) {
-  std::string uuid = lower_case(wanted);
+/// The first device that is `wanted` (what follows "API:", empty for any), null if none is. An
+/// index or UUID counts before parts of names, which may hold digits; a number is always an index.
+const DeviceInfo* find(const std::vector<DeviceInfo>& devices, const Api& api,
+                       const std::string& wanted) {
+  const std::string name_part = lower_case(wanted);
+  std::string uuid = name_part;
   std::erase(uuid, '-');
-  return wanted.empty() || device.id == std::string(api.id) + ":" + wanted || device.uuid == uuid ||
-         lower_case(device.name).find(lower_case(wanted)) != std::string::npos;
+  const auto first = [&devices](auto is_wanted) {
+    const auto found = std::find_if(devices.begin(), devices.end(), is_wanted);
+    return found == devices.end() ? nullptr : &*found;
+  };
+  const DeviceInfo* exact = first([&](const DeviceInfo& device) {
+    return device.id == std::string(api.id) + ":" + wanted ||
+           (!uuid.empty() && device.uuid == uuid);
+  });
+  const bool is_number =
+      !wanted.empty() && wanted.find_first_not_of("0123456789") == std::string::npos;
+  if (exact != nullptr || is_number) return exact;
+  return first([&](const DeviceInfo& device) {
+    return lower_case(device.name).find(name_part) != std::string::npos;
+  });
 }
 
 std::unique_ptr<Device::Implementation> open_listed(const DeviceInfo& device,
@@ -77,15 +92,15 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
   }
   std::stable_sort(devices.begin(), devices.end(),
                    [](const auto& a, const auto& b) { return rank(a) < rank(b); });
-  for (const DeviceInfo& device : devices) {
-    if (!matches(device, api, wanted)) continue;
-    if (!device.unusable.empty()) {
-      throw Error("The " + name + " device " + device.name + " cannot be used: " + device.unusable);
-    }
-    return open_listed(device, request);
+  const DeviceInfo* device = find(devices, api, wanted);
+  if (device == nullptr) {
+    throw Error("No " + name + " device is called \"" + wanted +
+                "\"; there are: " + names_of(devices) + ".");
   }
-  throw Error("No " + name + " device is called \"" + wanted +
-              "\"; there are: " + names_of(devices) + ".");
+  if (!device->unusable.empty()) {
+    throw Error("The " + name + " device " + device->name + " cannot be used: " + device->unusable);
+  }
+  return open_listed(*device, request);
 }
 
 /// Which CUDA devices cannot be used and why. Someone without an NVIDIA driver need not read of

@@ -142,7 +142,7 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
   if (device < 0 || device >= emulation().devices) return cudaErrorInvalidDevice;
   if (const cudaError_t error = step()) return error;
   *properties = {};
-  std::strcpy(properties->name, "Emulated GPU");
+  std::strncpy(properties->name, emulation().name, sizeof properties->name - 1);
   for (int i = 0; i < 16; ++i) properties->uuid.bytes[i] = static_cast<char>(0xf0 - i + device);
   properties->major = emulation().major;
   return cudaSuccess;

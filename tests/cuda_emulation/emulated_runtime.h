@@ -11,9 +11,10 @@
 
 namespace widestereo::test {
 
-/// Of the one emulated device; tests run one after the other.
+/// Of the emulated devices, which are alike; tests run one after the other.
 struct Emulation {
   int devices = 1;
+  const char* name = "Emulated GPU";  ///< of each device
   int driver_version = 12040;
   cudaError_t count_error = cudaSuccess;
   int compute_mode = cudaComputeModeDefault;

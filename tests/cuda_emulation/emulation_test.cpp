@@ -194,6 +194,19 @@ TEST_F(CudaEmulation, DevicesAreFoundByIndexNameAndUuid) {
   EXPECT_THAT(error_of([] { Device::open("cuda:7"); }), HasSubstr("cuda:1 (Emulated GPU)"));
 }
 
+TEST_F(CudaEmulation, DigitsOfANameAreNoIndex) {
+  emulation().devices = 2;
+  emulation().name = "NVIDIA H100 80GB";
+  EXPECT_EQ(Device::open("cuda:1").info().id, "cuda:1");
+  EXPECT_EQ(Device::open("cuda:h100").info().id, "cuda:0");
+  EXPECT_THAT(error_of([] { Device::open("cuda:100"); }),
+              HasSubstr("No CUDA device is called \"100\"; there are: cuda:0 (NVIDIA H100 80GB)"));
+  // A name that holds the other device's UUID.
+  const std::string uuid = list_cuda_devices(nullptr)[1].uuid;
+  emulation().name = uuid.c_str();
+  EXPECT_EQ(Device::open("cuda:" + uuid).info().id, "cuda:1");
+}
+
 TEST_F(CudaEmulation, DevicesStateTheirPeaks) {
   const DevicePeaks h200 = Device::open("cuda").info().peaks;
   EXPECT_NEAR(h200.gflops, 66908, 1);  // as NVIDIA's data sheet: 67 TFLOP/s
