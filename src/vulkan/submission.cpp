@@ -47,6 +47,7 @@ Submission::~Submission() {
 }
 
 VkCommandBuffer Submission::begin() {
+  wait();
   const DeviceFunctions& vk = context_.vk();
   VkCommandBufferBeginInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;

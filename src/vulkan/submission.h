@@ -16,7 +16,7 @@ class Submission {
   Submission(const Submission&) = delete;
   Submission& operator=(const Submission&) = delete;
 
-  /// Starts recording; must not be in flight.
+  /// Starts recording; waits for the end of what is still in flight.
   VkCommandBuffer begin();
   /// Notes the time when all earlier commands have finished. Does nothing on devices without a
   /// clock.

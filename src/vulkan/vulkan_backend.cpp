@@ -428,8 +428,6 @@ struct VulkanBackend::Run {
 
 void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
   require_constants(schedule);
-  // Left in flight by a run that ended in an exception.
-  for (auto& submission : submissions_) submission->wait();
   times_.clear();
   const std::vector<Band> bands = split_into_bands(schedule, max_samples_);
   Run run{*this, schedule, ScheduleProgress(schedule, progress)};
