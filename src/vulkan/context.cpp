@@ -6,6 +6,23 @@
 #include "widestereo/error.h"
 
 namespace widestereo {
+namespace {
+
+/// The handles of an application, none of which may be missing.
+const VulkanHandles& complete(const VulkanHandles& handles) {
+  const auto require = [](bool given, const std::string& name) {
+    if (given) return;
+    throw Error("The Vulkan handles have no " + name + "; set VulkanHandles::" + name + ".");
+  };
+  require(handles.get_instance_proc_addr != nullptr, "get_instance_proc_addr");
+  require(handles.instance != VK_NULL_HANDLE, "instance");
+  require(handles.physical_device != VK_NULL_HANDLE, "physical_device");
+  require(handles.device != VK_NULL_HANDLE, "device");
+  require(handles.queue != VK_NULL_HANDLE, "queue");
+  return handles;
+}
+
+}  // namespace
 
 VulkanContext::VulkanContext(PFN_vkGetInstanceProcAddr get, VkInstance instance,
                              VkPhysicalDevice physical_device)
@@ -21,10 +38,13 @@ VulkanContext::VulkanContext(PFN_vkGetInstanceProcAddr get, VkInstance instance,
 }
 
 VulkanContext::VulkanContext(const VulkanHandles& adopted)
-    : handles_(adopted),
+    : handles_(complete(adopted)),
       instance_functions_(
           InstanceFunctions::load(adopted.get_instance_proc_addr, adopted.instance)) {
   require_usable();
+  const std::string why =
+      why_no_compute(instance_functions_, handles_.physical_device, handles_.queue_family);
+  if (!why.empty()) throw Error("The Vulkan device " + name() + " " + why);
   load_functions();
 }
 

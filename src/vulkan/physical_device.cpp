@@ -98,6 +98,20 @@ std::optional<std::uint32_t> compute_queue_family(const InstanceFunctions& vk,
   return found;
 }
 
+std::string why_no_compute(const InstanceFunctions& vk, VkPhysicalDevice device,
+                           std::uint32_t queue_family) {
+  const auto families = queue_families(vk, device);
+  const std::string family = "queue family " + std::to_string(queue_family);
+  if (queue_family >= families.size()) {
+    return "has no " + family + ", only " + std::to_string(families.size()) +
+           ", counted from 0; give the family of the queue.";
+  }
+  if ((families[queue_family].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) {
+    return "has a " + family + " that cannot compute; give a queue of another family.";
+  }
+  return "";
+}
+
 std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice device,
                              std::uint32_t queue_family) {
   return queue_families(vk, device).at(queue_family).timestampValidBits;

@@ -22,6 +22,10 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device);
 std::optional<std::uint32_t> compute_queue_family(const InstanceFunctions& vk,
                                                   VkPhysicalDevice device);
 
+/// Why a queue of this family cannot run kernels, after the device's name; empty if it can.
+std::string why_no_compute(const InstanceFunctions& vk, VkPhysicalDevice device,
+                           std::uint32_t queue_family);
+
 /// Bits of a timestamp of a queue family, 0 where it has none.
 std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice device,
                              std::uint32_t queue_family);

@@ -59,7 +59,17 @@ VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceP
 
 VKAPI_ATTR void VKAPI_CALL queue_families(VkPhysicalDevice device, std::uint32_t* count,
                                           VkQueueFamilyProperties* families) {
+  const std::uint32_t room = *count;
   real_queue_families(device, count, families);
+  if (faults().transfer_family) {
+    faults().families = ++*count;
+    if (families == nullptr) return;
+    if (*count <= room) {
+      families[*count - 1] = {};
+      families[*count - 1].queueFlags = VK_QUEUE_TRANSFER_BIT;
+    }
+    return;
+  }
   for (std::uint32_t i = 0; families != nullptr && i < *count; ++i) {
     families[i].queueFlags &= ~static_cast<VkQueueFlags>(VK_QUEUE_COMPUTE_BIT);
   }
@@ -104,7 +114,8 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance(VkInstance instance, const
   if (wanted == "vkGetPhysicalDeviceProperties2") {
     return wrap(real, real_properties, &properties);
   }
-  if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" && faults().no_compute_queues) {
+  if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" &&
+      (faults().no_compute_queues || faults().transfer_family)) {
     return wrap(real, real_queue_families, &queue_families);
   }
   if (wanted == "vkGetPhysicalDeviceImageFormatProperties" && faults().largest_image > 0) {

@@ -107,11 +107,13 @@ struct Faults {
   bool no_layers = false;
   bool no_formats = false;
   bool no_compute_queues = false;
-  bool old_device = false;  ///< Vulkan 1.0
+  bool transfer_family = false;  ///< one more queue family, the last, which does not compute
+  bool old_device = false;       ///< Vulkan 1.0
   std::uint32_t largest_image = 0;
   std::uint32_t largest_push_constants = 0;
   std::string missing_function = {};
   int allocations = 0;
+  std::uint32_t families = 0;  ///< queue families, with transfer_family
   int submissions = 0;
   int waits = 0;
 };

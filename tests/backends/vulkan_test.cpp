@@ -195,6 +195,38 @@ TEST(VulkanMatch, RecordsIntoAnApplicationsCommandBuffer) {
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
+TEST(VulkanContexts, RefuseHandlesThatDoNotDo) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const Application application;
+  const VulkanHandles good = application.context.handles();
+  const auto error = [](const VulkanHandles& handles) {
+    return error_of([&] { const VulkanContext adopted(handles); });
+  };
+  EXPECT_EQ(error(good), "");
+  const auto without = [&](auto VulkanHandles::*handle) {
+    VulkanHandles handles = good;
+    handles.*handle = nullptr;
+    return error(handles);
+  };
+  EXPECT_THAT(without(&VulkanHandles::get_instance_proc_addr), HasSubstr("get_instance_proc_addr"));
+  EXPECT_THAT(without(&VulkanHandles::instance), HasSubstr("no instance"));
+  EXPECT_THAT(without(&VulkanHandles::physical_device), HasSubstr("no physical_device"));
+  EXPECT_THAT(without(&VulkanHandles::device), HasSubstr("no device"));
+  EXPECT_THAT(without(&VulkanHandles::queue), HasSubstr("no queue"));
+  VulkanHandles handles = good;
+  handles.queue_family = 1000;
+  EXPECT_THAT(error(handles), HasSubstr("no queue family 1000"));
+
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults().transfer_family = true;
+  handles.get_instance_proc_addr = FaultyLoader::get_instance_proc_addr();
+  handles.queue_family = 0;
+  EXPECT_EQ(error(handles), "");
+  // Lavapipe has one family, after which the faulty loader puts another one.
+  handles.queue_family = FaultyLoader::faults().families - 1;
+  EXPECT_THAT(error(handles), HasSubstr("cannot compute"));
+}
+
 TEST(VulkanMatch, LeavesNoObjectBehind) {
   REQUIRE_VULKAN_OR_SKIP();
   const VulkanLoader loader;
