@@ -113,26 +113,32 @@ class Matcher::Implementation {
     }
     for (std::size_t i = 0; i < start.hypotheses.size(); ++i) {
       require_planes(start.hypotheses[i], rig_.views[i]);
-      backend_->set_hypotheses(static_cast<int>(i), start.hypotheses[i]);
     }
     set_motion(setup_.warm_schedule, rig_,
                start.now_from_previous.value_or(Eigen::Isometry3d::Identity()), start.frame);
-    return run(setup_.warm_schedule, images, progress);
+    return run(setup_.warm_schedule, images, progress, start.hypotheses);
   }
 
  private:
+  /// `hypotheses`: planes to upload, one map for each view, or none.
   StereoResult run(const Schedule& schedule, const std::vector<cv::Mat>& images,
-                   const Progress& progress) {
+                   const Progress& progress, const std::vector<cv::Mat>& hypotheses = {}) {
     const auto start = std::chrono::steady_clock::now();
     if (images.size() != rig_.views.size()) {
       throw Error("The rig has " + std::to_string(rig_.views.size()) + " views, but " +
                   std::to_string(images.size()) + " image(s) were given.");
     }
+    std::vector<cv::Mat> intensities;
     for (std::size_t i = 0; i < images.size(); ++i) {
-      backend_->set_intensity(static_cast<int>(i),
-                              masked_intensities(images[i], rig_.views[i], setup_.rays[i]));
+      intensities.push_back(masked_intensities(images[i], rig_.views[i], setup_.rays[i]));
     }
+    // What is refused is refused above, and leaves the planes of the last match in place.
     holds_planes_ = false;
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const int view = static_cast<int>(i);
+      backend_->set_intensity(view, intensities[i]);
+      if (!hypotheses.empty()) backend_->set_hypotheses(view, hypotheses[i]);
+    }
     backend_->run(schedule, progress);
     holds_planes_ = true;
 

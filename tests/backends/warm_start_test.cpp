@@ -10,6 +10,7 @@
 
 #include "device_fixture.h"
 #include "error_of.h"
+#include "kernel/host.h"
 #include "widestereo/matcher.h"
 #include "widestereo/motion.h"
 #include "widestereo/synthesis.h"
@@ -139,6 +140,35 @@ TEST_P(WarmStarts, NeedPlanesThatFit) {
   start.hypotheses.assign(2, cv::Mat::zeros(3, 4, CV_32FC4));
   EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), start); }),
               HasSubstr("cam0 from are 4x3"));
+}
+
+TEST_P(WarmStarts, ARefusedFrameChangesNothing) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Options options = options_of("fast");
+  options.window_radius = 2;
+  options.warm_iterations = 1;
+  Matcher matcher(*device, frame(0).rig, options);
+  Matcher untroubled(*device, frame(0).rig, options);
+  matcher.match(images_of(frame(0)));
+  untroubled.match(images_of(frame(0)));
+  WarmStart bad{.now_from_previous = Eigen::Isometry3d::Identity()};
+  bad.hypotheses.assign(2, cv::Mat(size, size, CV_32FC4, cv::Scalar(0, 0, 0, INVALID_COST)));
+  const auto refused = [&](const std::vector<cv::Mat>& images) {
+    return error_of([&] { matcher.match_next(images, bad); });
+  };
+  std::vector<cv::Mat> images = images_of(frame(1));
+  images[1] = images[1](cv::Rect(0, 0, 9, 9));
+  EXPECT_THAT(refused(images), HasSubstr("cam1"));
+  bad.hypotheses[1] = cv::Mat::zeros(3, 4, CV_32FC4);
+  EXPECT_THAT(refused(images_of(frame(1))), HasSubstr("cam1 from are 4x3"));
+
+  const WarmStart start{.now_from_previous = motion_to(1)};
+  const StereoResult expected = untroubled.match_next(images_of(frame(1)), start);
+  const StereoResult result = matcher.match_next(images_of(frame(1)), start);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_TRUE(same_bits(result.views[i].hypotheses, expected.views[i].hypotheses)) << i;
+  }
+  expect_no_validation_messages(*device);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, WarmStarts, ::testing::Values("cpu", "vulkan", "cuda"),
