@@ -136,13 +136,7 @@ std::size_t CudaBackend::device_bytes() const {
 }
 
 void CudaBackend::upload(void* memory, int stride, int view, const cv::Mat& map, int type) {
-  const cv::Size expected = size(view);
-  if (map.size() != expected || map.type() != type) {
-    throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) +
-                "x" + std::to_string(map.rows) + " of type " + cv::typeToString(map.type()) +
-                ", but " + std::to_string(expected.width) + "x" + std::to_string(expected.height) +
-                " of " + cv::typeToString(type) + " is needed.");
-  }
+  require_map(map, view, size(view), type);
   const CurrentDevice current = make_current();
   const std::size_t pitch = static_cast<std::size_t>(stride) * map.elemSize();
   const std::size_t row = static_cast<std::size_t>(map.cols) * map.elemSize();
@@ -183,10 +177,7 @@ cv::Mat CudaBackend::checks(int view) {
 }
 
 void CudaBackend::set_parameters(Prepared& prepared, const Schedule& schedule) {
-  if (!(schedule.constants == constants_)) {
-    throw Error(
-        "The schedule was made for other kernel constants than this matcher; make a new one.");
-  }
+  require_constants(schedule, constants_);
   check(cudaMemcpyAsync(prepared.parameters.get(), &schedule.parameters, sizeof schedule.parameters,
                         cudaMemcpyHostToDevice, stream_.get()),
         "receive the parameters");

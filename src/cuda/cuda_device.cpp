@@ -99,10 +99,11 @@ DeviceInfo describe_cuda_device(int index) {
   return info;
 }
 
-/// About 100 ms of a slow device, where a display's time limit ends kernels after seconds.
+/// About 100 ms where a display's time limit ends kernels after seconds.
 long long default_max_samples(int index) {
   if (attribute(cudaDevAttrKernelExecTimeout, index) == 0) return 0;
-  return attribute(cudaDevAttrIntegrated, index) != 0 ? 300'000'000 : 2'000'000'000;
+  return attribute(cudaDevAttrIntegrated, index) != 0 ? samples_of_integrated_gpu
+                                                      : samples_of_discrete_gpu;
 }
 
 class CudaDevice final : public Device::Implementation {

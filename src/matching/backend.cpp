@@ -2,6 +2,9 @@
 #include "matching/backend.h"
 
 #include <algorithm>
+#include <string>
+
+#include "widestereo/error.h"
 
 namespace widestereo {
 
@@ -24,6 +27,20 @@ void ScheduleProgress::advance(long long samples) {
   if (progress_ && samples > 0) {
     progress_(static_cast<double>(done_) / static_cast<double>(total_));
   }
+}
+
+void require_map(const cv::Mat& map, int view, cv::Size size, int type) {
+  if (map.size() == size && map.type() == type) return;
+  throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) + "x" +
+              std::to_string(map.rows) + " of type " + cv::typeToString(map.type()) + ", but " +
+              std::to_string(size.width) + "x" + std::to_string(size.height) + " of " +
+              cv::typeToString(type) + " is needed.");
+}
+
+void require_constants(const Schedule& schedule, const KernelConstants& constants) {
+  if (schedule.constants == constants) return;
+  throw Error(
+      "The schedule was made for other kernel constants than this matcher; make a new one.");
 }
 
 }  // namespace widestereo

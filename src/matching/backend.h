@@ -42,6 +42,16 @@ inline cv::Size with_apron(cv::Size size) {
 /// Likewise of its half pixels.
 inline cv::Size size_of_half_pixels(cv::Size size) { return with_apron(size) * 2; }
 
+/// Patch samples that a slow device of each kind works off in about 100 ms: dispatches of more are
+/// split where a watchdog may end them.
+inline constexpr long long samples_of_discrete_gpu = 2'000'000'000;
+inline constexpr long long samples_of_integrated_gpu = 300'000'000;
+
+/// Throws Error unless a map for a view has its size and type.
+void require_map(const cv::Mat& map, int view, cv::Size size, int type);
+/// Throws Error unless a schedule was made for the constants of a back end's kernels.
+void require_constants(const Schedule& schedule, const KernelConstants& constants);
+
 /// Memory and kernels for matches of fixed sizes on one device. All maps have their view's size.
 class Backend {
  public:

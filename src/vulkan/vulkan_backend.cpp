@@ -16,14 +16,14 @@ constexpr std::size_t max_bands_per_submission = 256;
 constexpr VkPipelineStageFlags compute_and_transfer =
     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
 
-/// About 100 ms of a slow device of each kind.
+/// About 100 ms on a slow device of each kind.
 long long default_max_samples(VkPhysicalDeviceType type) {
   switch (type) {
     case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-      return 2'000'000'000;
+      return samples_of_discrete_gpu;
     case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
     case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-      return 300'000'000;
+      return samples_of_integrated_gpu;
     default:
       return 20'000'000;
   }
@@ -263,12 +263,7 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stage
 void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map, int type,
                            int apron) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
-  if (map.size() != size || map.type() != type) {
-    throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) +
-                "x" + std::to_string(map.rows) + " of type " + cv::typeToString(map.type()) +
-                ", but " + std::to_string(size.width) + "x" + std::to_string(size.height) + " of " +
-                cv::typeToString(type) + " is needed.");
-  }
+  require_map(map, view, size, type);
   map.copyTo(cv::Mat(size, type, staging_.mapped));
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layers_of(view, 1);
@@ -322,19 +317,13 @@ std::size_t VulkanBackend::device_bytes() const {
   return static_cast<std::size_t>(bytes);
 }
 
-void VulkanBackend::require_constants(const Schedule& schedule) const {
-  if (schedule.constants == constants_) return;
-  throw Error(
-      "The schedule was made for other kernel constants than this matcher; make a new one.");
-}
-
 void VulkanBackend::record_barrier(VkCommandBuffer commands) const {
   barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
           VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT);
 }
 
 void VulkanBackend::record_parameters(VkCommandBuffer commands, const Schedule& schedule) const {
-  require_constants(schedule);
+  require_constants(schedule, constants_);
   barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
   context_.vk().vkCmdUpdateBuffer(commands, parameters_.handle.get(), 0, sizeof schedule.parameters,
                                   &schedule.parameters);
@@ -427,7 +416,7 @@ struct VulkanBackend::Run {
 };
 
 void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
-  require_constants(schedule);
+  require_constants(schedule, constants_);
   times_.clear();
   const std::vector<Band> bands = split_into_bands(schedule, max_samples_);
   Run run{*this, schedule, ScheduleProgress(schedule, progress)};

@@ -68,7 +68,6 @@ class VulkanBackend final : public Backend {
   void transition(VkCommandBuffer commands, const LayeredImage& image,
                   const VkImageSubresourceRange& layers, VkImageLayout from,
                   VkImageLayout to) const;
-  void require_constants(const Schedule& schedule) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
   /// `apron`: where the map begins in the image, both ways.
