@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Propagation from the best pixels of eight strips, and refinement in units of source pixels.
 
-#define STRIPS 8
-#define CANDIDATE_INVERSE_DISTANCE 8
-#define CANDIDATE_NORMAL 9
-#define CANDIDATE_BOTH 10
-#define CANDIDATE_RANDOM_DISTANCE 11
-#define CANDIDATE_SURROUNDINGS 12
-#define CANDIDATE_SOURCE_PLANE 13
-
 // Pixels away at which the surroundings of a pixel are taken for a normal.
 #define SURROUNDINGS_RADIUS 3
 
@@ -51,8 +43,8 @@ FN int telling_source(CONTEXT_ARGUMENT vec3 ray, float w, OUT(vec2) velocity) {
 // The plane of lowest cost on a strip: 7 near pixels in a V, or 11 far ones along a line up to 23 pixels
 // away, up, down, left or right. All are of the other colour, so that no thread reads what another writes.
 FN vec3 best_of_strip(CONTEXT_ARGUMENT ivec2 pixel, int strip) {
-  bool near = strip < 4;
-  int side = strip & 3;
+  bool near = strip < NEAR_STRIPS;
+  int side = near ? strip : strip - NEAR_STRIPS;
   float lowest = INVALID_COST;
   vec3 best = vec3(0.0f, 0.0f, 0.0f);
   int count = near ? 7 : 11;
@@ -60,9 +52,9 @@ FN vec3 best_of_strip(CONTEXT_ARGUMENT ivec2 pixel, int strip) {
     int arm = (k + 1) / 2;
     int along = near ? 1 + arm : 3 + 2 * k;
     int across = near ? ((k & 1) == 1 ? -arm : arm) : 0;
-    if ((side & 1) == 0) along = -along;
-    ivec2 q = side < 2 ? ivec2(pixel.x + across, pixel.y + along)
-                       : ivec2(pixel.x + along, pixel.y + across);
+    if (side == STRIP_UP || side == STRIP_LEFT) along = -along;
+    ivec2 q = side == STRIP_UP || side == STRIP_DOWN ? ivec2(pixel.x + across, pixel.y + along)
+                                                     : ivec2(pixel.x + along, pixel.y + across);
     if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
     vec4 candidate = hypothesis_at(CONTEXT PASS.reference, q);
     if (candidate.w < lowest) {

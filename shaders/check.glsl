@@ -2,18 +2,6 @@
 // What is known about a pixel once all views have planes: agreement with the sources' own planes and with the
 // surroundings, texture, ambiguity, parallax and tilt, summed up as reasons for rejection and a confidence.
 
-#define REASON_NO_RAY 1
-#define REASON_NO_OVERLAP 2
-#define REASON_NO_TEXTURE 4
-#define REASON_HIGH_COST 8
-#define REASON_INCONSISTENT 16
-#define REASON_UNCHECKED 32
-#define REASON_LOW_PARALLAX 64
-#define REASON_TILT 128
-#define REASON_AMBIGUOUS 256
-#define REASON_SPECKLE 512
-#define REASON_FILLED 1024
-
 // The surroundings of a pixel: a sparse grid of this radius and step.
 #define SUPPORT_RADIUS 20
 #define SUPPORT_STEP 4

@@ -2,8 +2,6 @@
 // Intensities of a view at half pixels. Bilinear samples of them, as texture units take them, come near to cubic
 // interpolation of the pixels.
 
-#define INTERPOLATE_CUBIC 1u
-
 // Halfway between a and b, which lie between `before` and `after`; masked where a or b is.
 FN float intensity_between(CONTEXT_ARGUMENT float before, float a, float b, float after) {
   if (min(a, b) < 0.0f) return MASKED_INTENSITY;

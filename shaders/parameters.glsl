@@ -19,6 +19,60 @@
 #define VOTE_RIVALS 2
 #define VOTE_MIDDLE_RADIUS 1
 
+// What options and results are as numbers (include/widestereo/options.h, matcher.h).
+#define WARP_EXACT 0
+#define WARP_AFFINE 1
+#define WARP_QUADRATIC 2
+
+#define PATTERN_DENSE 0
+#define PATTERN_CHECKERBOARD 1
+
+#define FILTER_EXACT 0
+#define FILTER_DEVICE 1
+
+#define SAMPLING_UNIFORM 0
+#define SAMPLING_INVERSE 1
+
+#define REASON_NO_RAY 1
+#define REASON_NO_OVERLAP 2
+#define REASON_NO_TEXTURE 4
+#define REASON_HIGH_COST 8
+#define REASON_INCONSISTENT 16
+#define REASON_UNCHECKED 32
+#define REASON_LOW_PARALLAX 64
+#define REASON_TILT 128
+#define REASON_AMBIGUOUS 256
+#define REASON_SPECKLE 512
+#define REASON_FILLED 1024
+
+// Bits of PassParameters.neighbours.
+#define NEIGHBOUR_LEFT 1
+#define NEIGHBOUR_RIGHT 2
+#define NEIGHBOUR_UP 4
+#define NEIGHBOUR_DOWN 8
+
+// Kinds of candidates of the adaptive search, numbers of bits of PassParameters.candidates: first the near strips to
+// these sides, then the far ones to the same.
+#define STRIP_UP 0
+#define STRIP_DOWN 1
+#define STRIP_LEFT 2
+#define STRIP_RIGHT 3
+#define NEAR_STRIPS 4
+#define STRIPS 8
+#define CANDIDATE_INVERSE_DISTANCE 8
+#define CANDIDATE_NORMAL 9
+#define CANDIDATE_BOTH 10
+#define CANDIDATE_RANDOM_DISTANCE 11
+#define CANDIDATE_SURROUNDINGS 12
+#define CANDIDATE_SOURCE_PLANE 13
+
+// Bits of PassParameters.candidates of other kernels: see intensity_between(), measure_pixel(), regress_plane() and
+// adopt_pixel().
+#define INTERPOLATE_CUBIC 1u
+#define SUBPIXEL_MATCH 1u
+#define REGRESS_NORMALS 1u
+#define ADOPT_UNSEEN 2u
+
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {
   vec4 row0;

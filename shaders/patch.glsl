@@ -4,13 +4,6 @@
 
 #define NO_INFORMATION_COST 1.0f
 
-#define WARP_EXACT 0
-#define WARP_AFFINE 1
-#define WARP_QUADRATIC 2
-
-#define FILTER_EXACT 0
-#define FILTER_DEVICE 1
-
 FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
@@ -207,7 +200,6 @@ FN float zncc_cost(float n, float sum_a, float sum_b, float sum_aa, float sum_bb
   return 1.0f - clamp(covariance / scale, -1.0f, 1.0f);
 }
 
-#define PATTERN_CHECKERBOARD 1
 #define COLUMN_STEP (PATTERN == PATTERN_CHECKERBOARD ? 2 : 1)
 
 // First column of the row of a patch of this radius: on the checkerboard the centre is a sample.

@@ -23,10 +23,6 @@
 #define NORMAL_ROUNDS 4
 // Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
 #define LARGEST_SLOPE_CHANGE 6.0f
-// Bits of PASS.candidates: see measure_pixel(), regress_plane() and adopt_pixel().
-#define SUBPIXEL_MATCH 1u
-#define REGRESS_NORMALS 1u
-#define ADOPT_UNSEEN 2u
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.

@@ -1,15 +1,8 @@
 // SPDX-License-Identifier: MIT
 // PatchMatch over plane hypotheses: random initialisation, propagation and random refinement of one pixel.
 
-#define UNIFORM_SAMPLING 0
-
 // Share of the range of inverse distance over which half of the preference for far planes builds up.
 #define SATURATED_SHARE 0.03f
-
-#define NEIGHBOUR_LEFT 1
-#define NEIGHBOUR_RIGHT 2
-#define NEIGHBOUR_UP 4
-#define NEIGHBOUR_DOWN 8
 
 // Random numbers of this iteration and frame.
 FN vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
@@ -26,7 +19,7 @@ FN vec3 normal_from_angles(float theta, float phi) {
 // A distance drawn from the range as the options ask, u in [0, 1).
 FN float draw_distance(CONTEXT_ARGUMENT float u) {
   vec4 range = PARAMETERS.range;
-  if (PARAMETERS.search.x == UNIFORM_SAMPLING) return range.x + u * (range.y - range.x);
+  if (PARAMETERS.search.x == SAMPLING_UNIFORM) return range.x + u * (range.y - range.x);
   return 1.0f / (range.z + u * (range.w - range.z));
 }
 
@@ -57,7 +50,7 @@ FN vec3 perturbed_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float sc
   vec4 range = PARAMETERS.range;
   float w = dot(m, ray);
   float distance = 1.0f / w;
-  if (PARAMETERS.search.x == UNIFORM_SAMPLING) {
+  if (PARAMETERS.search.x == SAMPLING_UNIFORM) {
     distance += scale * 0.25f * (range.y - range.x) * (2.0f * u.x - 1.0f);
     distance = clamp(distance, range.x, range.y);
   } else {

@@ -7,7 +7,7 @@
 
 namespace widestereo {
 
-/// How a patch is mapped into a source image (values of the kernels, shaders/patch.glsl).
+/// How a patch is mapped into a source image (values of the kernels, shaders/parameters.glsl).
 enum class PatchWarp : int {
   exact = 0,      ///< every sample through the real camera model
   affine = 1,     ///< affine map through 5 exactly projected anchors
@@ -26,7 +26,7 @@ enum class Propagation : int {
   raster = 1,        ///< the paper's sequential order; CPU only
 };
 
-/// Which pixels of a patch are compared (values of the kernels, shaders/patch.glsl).
+/// Which pixels of a patch are compared (values of the kernels, shaders/parameters.glsl).
 enum class PatchPattern : int {
   dense = 0,         ///< all
   checkerboard = 1,  ///< every other one
@@ -38,7 +38,7 @@ enum class Interpolation : int {
   cubic = 1,   ///< of Catmull and Rom's spline: keeps fine texture, as the reference has it
 };
 
-/// How half pixels are sampled, always bilinearly (values of the kernels, shaders/patch.glsl).
+/// How half pixels are sampled, always bilinearly (values of the kernels, shaders/parameters.glsl).
 enum class Filter : int {
   exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
   device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their

@@ -15,10 +15,10 @@ struct Get {
 }  // namespace
 
 KernelTable paper_kernels(int camera_model) {
-  return for_model<paper_window_radius, WARP_EXACT, 0, 0>(camera_model, Get());
+  return for_model<paper_window_radius, WARP_EXACT, PATTERN_DENSE, 0>(camera_model, Get());
 }
 KernelTable affine_paper_kernels(int camera_model) {
-  return for_model<paper_window_radius, WARP_AFFINE, 0, 0>(camera_model, Get());
+  return for_model<paper_window_radius, WARP_AFFINE, PATTERN_DENSE, 0>(camera_model, Get());
 }
 
 }  // namespace widestereo::kernel::cuda

@@ -3,7 +3,8 @@
 
 namespace widestereo::kernel::cuda {
 KernelTable quality_kernels(int camera_model) {
-  return for_model<pyramid_window_radius, WARP_AFFINE, 0, 1>(camera_model, PyramidKernels());
+  return for_model<pyramid_window_radius, WARP_AFFINE, PATTERN_DENSE, 1>(camera_model,
+                                                                         PyramidKernels());
 }
 
 }  // namespace widestereo::kernel::cuda

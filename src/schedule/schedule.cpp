@@ -8,15 +8,16 @@
 #include <cstddef>
 
 #include "geometry/camera_parameters.h"
+#include "kernel/enumerations.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
 
 namespace widestereo {
 namespace {
 
-constexpr int all_neighbours = 15;
-constexpr int left_and_up = 1 | 4;
-constexpr int right_and_down = 2 | 8;
+constexpr int left_and_up = NEIGHBOUR_LEFT | NEIGHBOUR_UP;
+constexpr int right_and_down = NEIGHBOUR_RIGHT | NEIGHBOUR_DOWN;
+constexpr int all_neighbours = left_and_up | right_and_down;
 
 // The blocks are uploaded as they are: their layout must be std140 (parameters) and std430 (pass).
 static_assert(sizeof(kernel::CameraParameters) == 80);
@@ -82,21 +83,16 @@ std::vector<View> pyramid(const Rig& rig, int levels) {
   return views;
 }
 
-// Candidate kinds of shaders/adaptive_search.glsl.
-constexpr std::array<unsigned, 2> near_strips = {1 | 4, 2 | 8};  // up and left, down and right
-constexpr unsigned strips = 0xff;
-constexpr unsigned inverse_distance = 1u << 8;
-constexpr unsigned both = 1u << 10;
-constexpr unsigned random_distance = 1u << 11;
-constexpr unsigned surroundings = 1u << 12;
-constexpr unsigned source_planes = 1u << 13;
-constexpr unsigned normal = 1u << 9;
-// Of shaders/interpolation.glsl.
-constexpr unsigned interpolate_cubic = 1;
-// Of shaders/regression.glsl.
-constexpr unsigned subpixel_match = 1;
-constexpr unsigned regress_normals = 1;
-constexpr unsigned adopt_unseen = 2;
+// Candidates of shaders/adaptive_search.glsl.
+constexpr std::array<unsigned, 2> near_strips = {1u << STRIP_UP | 1u << STRIP_LEFT,
+                                                 1u << STRIP_DOWN | 1u << STRIP_RIGHT};
+constexpr unsigned strips = (1u << STRIPS) - 1;
+constexpr unsigned inverse_distance = 1u << CANDIDATE_INVERSE_DISTANCE;
+constexpr unsigned normal = 1u << CANDIDATE_NORMAL;
+constexpr unsigned both = 1u << CANDIDATE_BOTH;
+constexpr unsigned random_distance = 1u << CANDIDATE_RANDOM_DISTANCE;
+constexpr unsigned surroundings = 1u << CANDIDATE_SURROUNDINGS;
+constexpr unsigned source_planes = 1u << CANDIDATE_SOURCE_PLANE;
 
 /// Appends the dispatches of one schedule.
 class Builder {
@@ -170,7 +166,7 @@ class Builder {
   void interpolate(int level) {
     for (const int view : views_of(level)) {
       kernel::PassParameters pass = pass_of(view);
-      pass.candidates = options_.interpolation == Interpolation::cubic ? interpolate_cubic : 0;
+      pass.candidates = options_.interpolation == Interpolation::cubic ? INTERPOLATE_CUBIC : 0;
       add(Kernel::interpolate, pass, view, 0);
     }
   }
@@ -205,7 +201,7 @@ class Builder {
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
         for (const int view : views_of(level)) {
-          measure(view, i == 0 && options_.subpixel_match ? subpixel_match : 0);
+          measure(view, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
           regress(view, level, precision_of_round(i), level == 0 ? until_vote() : 0);
         }
         if (level > 0) continue;
@@ -306,7 +302,7 @@ class Builder {
     for (const int view : views_of(0)) measure(view, 0);
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const unsigned how =
-          i + 1 == options_.warm_regressions ? regress_normals | until_vote() : adopt_unseen;
+          i + 1 == options_.warm_regressions ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN;
       for (const int view : views_of(0)) {
         regress(view, 0, precision_of_round(i), how);
       }
@@ -389,7 +385,7 @@ class Builder {
     kernel::PassParameters pass = pass_of(view);
     pass.candidates = how;
     // A sub-pixel match looks at the source that tells most.
-    add_with_patches(Kernel::measure, pass, view, (how & subpixel_match) != 0 ? 1 : 0);
+    add_with_patches(Kernel::measure, pass, view, (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
   }
 
   /// The view must have been measured. `precision`: 0 leaves the distances as they are.
@@ -405,11 +401,11 @@ class Builder {
     pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
     add(Kernel::regress, pass, view, 0);
-    add(Kernel::adopt, pass, view, (how & adopt_unseen) != 0 ? 0 : 1);
+    add(Kernel::adopt, pass, view, (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
   }
 
   /// Planes need their costs only once they have been voted on.
-  unsigned until_vote() const { return options_.vote_radius > 0 ? adopt_unseen : 0; }
+  unsigned until_vote() const { return options_.vote_radius > 0 ? ADOPT_UNSEEN : 0; }
 
   void vote() {
     if (options_.vote_radius == 0) return;
