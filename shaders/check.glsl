@@ -109,7 +109,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec2 difference = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
   float confidence = 0.0f;
   int reasons = 0;
-  if (usable_ray.w == 0.0f) {
+  if (!is_usable(CONTEXT pixel, usable_ray)) {
     reasons = REASON_NO_RAY;
   } else if (held.w >= INVALID_COST) {
     reasons = REASON_NO_OVERLAP;

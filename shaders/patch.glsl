@@ -8,6 +8,11 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
+// Whether the reference has a ray and an intensity there.
+FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
+  return ray.w != 0.0f && intensity_at(CONTEXT PASS.reference, pixel) >= 0.0f;
+}
+
 // Where a position (pixels) lies in what sample_image() reads: in half pixels.
 FN vec2 texel_at(vec2 position, int filter_kind) {
   vec2 texel = 2.0f * position;

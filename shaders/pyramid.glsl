@@ -2,10 +2,6 @@
 // Between the levels of the image pyramid. Every view has one entry for each level, with a camera of its own;
 // PASS.other is the same view one level finer (downsample) or coarser (upsample).
 
-FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
-  return ray.w != 0.0f && intensity_at(CONTEXT PASS.reference, pixel) >= 0.0f;
-}
-
 // Mean of the four finer pixels; masked unless at least three of them are usable.
 FN void downsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float sum = 0.0f;

@@ -17,7 +17,7 @@ namespace widestereo {
 /// Why a pixel was rejected: bits of ViewResult::reasons (values of the kernels,
 /// shaders/parameters.glsl).
 enum Reason : std::uint16_t {
-  reason_no_ray = 1,         ///< outside the lens, the model's domain or the mask
+  reason_no_ray = 1,         ///< outside the lens, the model's domain or the mask, or no intensity
   reason_no_overlap = 2,     ///< no plane there is visible in any source view
   reason_no_texture = 4,     ///< the patch carries no information
   reason_high_cost = 8,      ///< cost above Options::max_cost

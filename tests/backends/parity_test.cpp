@@ -331,6 +331,44 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
   expect_no_validation_messages(*device);
 }
 
+/// An application's images may have pixels that are no intensities; for them View::mask counts.
+TEST_P(EveryDevice, TreatsPixelsWithoutIntensityAsMasked) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const RenderedPair pair = render_demo(64);
+  const cv::Rect hole(24, 24, 12, 12);
+  for (const char* preset : {"fast", "paper"}) {
+    SCOPED_TRACE(preset);
+    Options options = Options::preset_named(preset);
+    std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+    options.first_iterations = 2;
+    options.second_iterations = 1;
+    options.fill_radius = 32;
+    const Schedule schedule = make_schedule(pair.rig, options);
+    std::vector<cv::Size> sizes;
+    for (const View& view : schedule.views) {
+      sizes.emplace_back(view.camera.width, view.camera.height);
+    }
+    const auto backend = device->implementation().make_backend(sizes, schedule.constants);
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const int view = static_cast<int>(i);
+      backend->set_rays(view, ray_image(schedule.views[i].camera, {}));
+      if (i >= pair.views.size()) continue;
+      cv::Mat intensity = to_intensity(pair.views[i].image, "test");
+      intensity(hole).setTo(MASKED_INTENSITY);
+      backend->set_intensity(view, intensity);
+    }
+    backend->run(schedule, {});
+    cv::Mat reasons;
+    cv::extractChannel(backend->checks(0), reasons, 3);
+    EXPECT_EQ(cv::countNonZero(reasons(hole) != static_cast<double>(reason_no_ray)), 0);
+    EXPECT_GT(cv::countNonZero(reasons > static_cast<double>(reason_filled)), 0);
+    cv::Mat cost;
+    cv::extractChannel(backend->hypotheses(0), cost, 3);
+    EXPECT_EQ(cv::countNonZero(cost(hole) < INVALID_COST), 0);
+  }
+  expect_no_validation_messages(*device);
+}
+
 /// A source a centimetre away, which tells next to nothing about distances, comes before the one
 /// that does.
 TEST_P(EveryDevice, BelievesTheSourceThatTellsMost) {

@@ -242,11 +242,17 @@ TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
   const RenderedPair pair = render_demo(side);
   std::vector<cv::Mat> images = device_images_of(pair, PixelType::intensity);
   images[0](cv::Rect(20, 20, 20, 20)).setTo(std::numeric_limits<float>::quiet_NaN());
-  VulkanMatcher matcher(application.context.handles(), pair.rig, small_options("fast"));
+  images[0](cv::Rect(20, 20, 20, 5)).setTo(1.1);
+  images[0](cv::Rect(20, 25, 20, 5)).setTo(-0.1);
+  Options options = small_options("fast");
+  options.fill_radius = side;
+  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
   ApplicationBuffers memory(application.context, PixelType::intensity);
   SharedBuffer distance(application.context, 4 * side * side);
+  SharedBuffer reasons(application.context, 4 * side * side);
   std::array<VulkanViewMaps, 2> maps;
   maps[0].distance = {distance.get(), 0, 4 * side};
+  maps[0].reasons = {reasons.get(), 0, 4 * side};
   const VulkanBuffers buffers = matcher.bind(memory.images(), maps);
   Commands commands(application.context);
   matcher.record(commands.get(), buffers);
@@ -254,8 +260,11 @@ TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
   memory.set(images);
   commands.run();
   const cv::Mat found = distance.mat({side, side}, CV_32FC1, 0, 4 * side);
-  EXPECT_EQ(cv::countNonZero(found(cv::Rect(20, 20, 20, 20))), 0);
+  const cv::Rect masked(20, 20, 20, 20);
+  EXPECT_EQ(cv::countNonZero(found(masked)), 0);
   EXPECT_GT(cv::countNonZero(found), side * side / 2);
+  const cv::Mat why = reasons.mat({side, side}, CV_32SC1, 0, 4 * side);
+  EXPECT_EQ(cv::countNonZero(why(masked) != static_cast<double>(reason_no_ray)), 0);
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
