@@ -62,6 +62,11 @@ FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2
   vec2 position;
   q = ivec2(0, 0);
   if (!warp_ray(pair, camera, model_of(CONTEXT camera), m, ray, position)) return false;
+  // Before the conversion, which is defined only for what an integer holds.
+  if (!(position.x >= -0.5f && position.y >= -0.5f && position.x < float(camera.size.x) &&
+        position.y < float(camera.size.y))) {
+    return false;
+  }
   q = ivec2(int(floor(position.x + 0.5f)), int(floor(position.y + 0.5f)));
   return in_image(camera.size, q);
 }

@@ -2,6 +2,7 @@
 // The kernels' patch cost against a slow, literal double-precision reference.
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 
 #include "kernel_fixture.h"
@@ -240,6 +241,31 @@ TEST(PatchCostRules, MeanOfTheBestSources) {
   EXPECT_FLOAT_EQ(kernel::cpu::patch_cost(fixture.context(), pixel, m), std::min(first, second));
   fixture.schedule().parameters.search.z = 2;
   EXPECT_FLOAT_EQ(kernel::cpu::patch_cost(fixture.context(), pixel, m), (first + second) / 2);
+}
+
+TEST(PixelInSource, IsFoundByItsCentreAndNowhereOutside) {
+  KernelFixture fixture(fisheye_rig(64), {});
+  fixture.set_reference(0);
+  const cv::Vec4f r = fixture.view(0).rays(32, 32);
+  const vec3 ray(r[0], r[1], r[2]);
+  kernel::CameraParameters& source = fixture.schedule().parameters.cameras[1];
+  const auto finds = [&](float x, float y, ivec2 expected) {
+    source.intrinsics = {0, 0, x, y};  // everything lands there
+    ivec2 found;
+    if (!kernel::cpu::pixel_in_source(fixture.context(), 1, ray, ray, found)) return false;
+    EXPECT_EQ(found.x, expected.x);
+    EXPECT_EQ(found.y, expected.y);
+    return true;
+  };
+  EXPECT_TRUE(finds(-0.5f, 63.49f, {0, 63}));
+  EXPECT_TRUE(finds(63.49f, -0.5f, {63, 0}));
+  EXPECT_TRUE(finds(20.5f, 30.49f, {21, 30}));
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  // The last ones are more than an integer holds.
+  for (const float outside : {-0.51f, 63.5f, 64.0f, 3e9f, -3e9f, 1e30f, nan}) {
+    EXPECT_FALSE(finds(outside, 20, {})) << outside;
+    EXPECT_FALSE(finds(20, outside, {})) << outside;
+  }
 }
 
 }  // namespace
