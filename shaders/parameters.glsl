@@ -72,6 +72,7 @@
 #define SUBPIXEL_MATCH 1u
 #define REGRESS_NORMALS 1u
 #define ADOPT_UNSEEN 2u
+#define HELD_UNSEEN 4u
 
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {
@@ -107,7 +108,8 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
-                    // measuring: SUBPIXEL_MATCH; regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN; filling: reasons not to fill
+                    // measuring: SUBPIXEL_MATCH; regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN, HELD_UNSEEN;
+                    // filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels

@@ -339,23 +339,34 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_prior(CONTEXT PASS.reference, pixel, prior);
 }
 
-// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN the cost stays
-// and the measure follows, for another regression that needs no new one.
+// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN only its point must
+// be seen: the cost stays and the measure follows, for another regression that needs no new one. With HELD_UNSEEN the
+// plane that the pixel holds came like that: where it stays it gets a cost of its own, of no information at most.
 FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
-  if (prior.w == 0.0f) return;
-  vec3 m = vec3(prior.x, prior.y, prior.z);
   vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
-  float cost = held.w;
-  bool unseen = (PASS.candidates & ADOPT_UNSEEN) != 0u;
-  if (!unseen) cost = patch_cost(CONTEXT pixel, m);
-  if (cost >= INVALID_COST) return;
-  vec4 adopted = vec4(m, cost);
-  store_hypothesis(CONTEXT PASS.reference, pixel, adopted);
-  if (unseen) {
+  bool held_unseen = (PASS.candidates & HELD_UNSEEN) != 0u;
+  if (held.w >= INVALID_COST || (prior.w == 0.0f && !held_unseen)) return;
+  vec3 own = vec3(held.x, held.y, held.z);
+  vec3 m = prior.w != 0.0f ? vec3(prior.x, prior.y, prior.z) : own;
+  if ((PASS.candidates & ADOPT_UNSEEN) != 0u) {
     vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+    vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
+    if (prior.w == 0.0f || !in_some_source(CONTEXT unit_ray, m)) return;
+    vec4 adopted = vec4(m, held.w);
+    store_hypothesis(CONTEXT PASS.reference, pixel, adopted);
     vec4 measure = check_at(CONTEXT PASS.reference, pixel);
-    measure.z = inverse_distance_of(adopted, vec3(ray.x, ray.y, ray.z));
+    measure.z = inverse_distance_of(adopted, unit_ray);
     store_check(CONTEXT PASS.reference, pixel, measure);
+    return;
   }
+  // A loop over both planes: the cost function is then compiled once.
+  float cost = INVALID_COST;
+  for (int i = 0; i < 2; ++i) {
+    cost = patch_cost(CONTEXT pixel, m);
+    if (cost < INVALID_COST || !held_unseen) break;
+    m = own;
+  }
+  if (cost >= INVALID_COST && held_unseen) cost = NO_INFORMATION_COST;
+  if (cost < INVALID_COST) store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
 }

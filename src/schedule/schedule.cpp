@@ -301,8 +301,9 @@ class Builder {
     // Measured once for all rounds, so that planes need their costs after the last one only.
     for (const int view : views_of(0)) measure(view, 0);
     for (int i = 0; i < options_.warm_regressions; ++i) {
+      const bool last = i + 1 == options_.warm_regressions;
       const unsigned how =
-          i + 1 == options_.warm_regressions ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN;
+          (last ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN) | (i > 0 ? HELD_UNSEEN : 0);
       for (const int view : views_of(0)) {
         regress(view, 0, precision_of_round(i), how);
       }
@@ -404,7 +405,8 @@ class Builder {
     add(Kernel::adopt, pass, view, (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
   }
 
-  /// Planes need their costs only once they have been voted on.
+  /// Regressed planes get their costs when they have been voted on. Until then, pixels keep those
+  /// of the planes before, which lie near enough for the checks of repair().
   unsigned until_vote() const { return options_.vote_radius > 0 ? ADOPT_UNSEEN : 0; }
 
   void vote() {
@@ -417,6 +419,7 @@ class Builder {
       add_with_samples(
           Kernel::vote, pass, view,
           (1 + VOTE_RIVALS) * samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
+      pass.candidates = HELD_UNSEEN;
       add(Kernel::adopt, pass, view, 1);
     }
   }

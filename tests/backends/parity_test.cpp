@@ -397,6 +397,57 @@ TEST_P(EveryDevice, BelievesTheSourceThatTellsMost) {
 INSTANTIATE_TEST_SUITE_P(Devices, EveryDevice, ::testing::Values("cpu", "vulkan", "cuda"),
                          [](const auto& test) { return std::string(test.param); });
 
+/// What a pixel holds and what it costs must not come from different planes, also where kernels
+/// adopt planes without a cost at first.
+TEST(Costs, AreThoseOfThePlanes) {
+  constexpr int side = 96;
+  // Inlined, it makes g++ warn of what it cannot see to be set.
+  float (*volatile cost_of)(const kernel::cpu::Context&, kernel::ivec2, kernel::vec3) =
+      &kernel::cpu::patch_cost;
+  for (const char* preset : {"fast", "quality"}) {
+    Options options = wide_range(preset);
+    options.warm_regressions = 2;
+    KernelFixture match(fisheye_rig(side), options);
+    const Schedule& schedule = match.schedule();
+    std::vector<cv::Size> sizes;
+    for (const View& view : schedule.views) {
+      sizes.emplace_back(view.camera.width, view.camera.height);
+    }
+    const Device cpu = Device::open("cpu");
+    const auto backend = cpu.implementation().make_backend(sizes, schedule.constants);
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      const int view = static_cast<int>(i);
+      backend->set_rays(view, ray_image(schedule.views[i].camera, {}));
+      if (view < 2) backend->set_intensity(view, match.view(view).image());
+    }
+    for (const int vote_radius : {options.vote_radius, 0}) {
+      options.vote_radius = vote_radius;
+      backend->run(make_schedule(match.rig(), options), {});
+      for (const char* start : {"cold", "warm"}) {
+        if (start == std::string("warm")) {
+          backend->run(make_warm_schedule(match.rig(), options), {});
+        }
+        int wrong = 0;
+        for (int view = 0; view < 2; ++view) {
+          match.set_reference(view);
+          const cv::Mat_<cv::Vec4f> planes = backend->hypotheses(view);
+          for (int y = 0; y < side; ++y) {
+            for (int x = 0; x < side; ++x) {
+              const cv::Vec4f& plane = planes(y, x);
+              if (plane[3] >= INVALID_COST) continue;
+              const float cost = cost_of(match.context(), {x, y}, {plane[0], plane[1], plane[2]});
+              // Filled planes, and those that no source sees, cost no information at most.
+              const float expected = std::min(cost, NO_INFORMATION_COST);
+              wrong += std::abs(std::min(plane[3], NO_INFORMATION_COST) - expected) > 1e-5f;
+            }
+          }
+        }
+        EXPECT_EQ(wrong, 0) << preset << " " << start << " " << vote_radius;
+      }
+    }
+  }
+}
+
 TEST(Checkerboard, ReachesRasterOrder) {
   Device cpu = Device::open("cpu");
   const RenderedPair pair = render_demo(96);

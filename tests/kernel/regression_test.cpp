@@ -139,6 +139,22 @@ TEST_F(Regression, FillsWhatWasNotMeasuredFromAround) {
   EXPECT_EQ(regressed(pixel, 18, 0.015), Eigen::Vector3d::Zero()) << "nothing to fill from";
 }
 
+TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {
+  const ivec2 pixel(48, 48);
+  const cv::Vec4f held(0, 0, 0.5f, 0.1f);
+  const cv::Vec4f prior(0, 0, 0.6f, 1);
+  const auto adopted = [&] {
+    fixture_.view(0).hypotheses(pixel.y, pixel.x) = held;
+    fixture_.view(0).priors(pixel.y, pixel.x) = prior;
+    fixture_.pass().candidates = ADOPT_UNSEEN;
+    kernel::cpu::adopt_pixel(fixture_.context(), pixel);
+    return fixture_.view(0).hypotheses(pixel.y, pixel.x);
+  };
+  EXPECT_EQ(adopted(), cv::Vec4f(0, 0, 0.6f, 0.1f));
+  fixture_.schedule().parameters.cameras[1].size.x = 1;
+  EXPECT_EQ(adopted(), held);
+}
+
 TEST_F(Regression, OfNormalsAloneKeepsDistancesAndUsesAllOfAPlane) {
   measure([](int) { return wall; }, 0.05, 0.05);
   const double error = over_pixels(24, 72, [&](ivec2 pixel) {
