@@ -206,27 +206,28 @@ std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {
                                         : std::numeric_limits<long long>::max());
 }
 
-void CudaBackend::launch_all(const Prepared& prepared, std::span<const Band> bands, Events events,
-                             unsigned record_flags) {
+std::vector<CudaBackend::Stretch> CudaBackend::launch_all(const Prepared& prepared,
+                                                          std::span<const Band> bands,
+                                                          Events events, unsigned record_flags) {
+  std::vector<Stretch> stretches;
   const auto record = [&] {
     if (events == Events::none) return;
-    check(
-        cudaEventRecordWithFlags(events_.at(stretches_.size()).get(), stream_.get(), record_flags),
-        "record an event");
+    check(cudaEventRecordWithFlags(events_.at(stretches.size()).get(), stream_.get(), record_flags),
+          "record an event");
   };
-  stretches_.clear();
   for (const Band& band : bands) {
     const Kernel kernel = band.dispatch->kernel;
-    if (stretches_.empty() || stretches_.back().kernel != kernel ||
+    if (stretches.empty() || stretches.back().kernel != kernel ||
         events == Events::between_launches) {
       record();
-      stretches_.push_back({kernel, 0, 0});
+      stretches.push_back({kernel, 0, 0});
     }
-    if (band.first_row == 0) ++stretches_.back().dispatches;
-    stretches_.back().samples += band.samples;
+    if (band.first_row == 0) ++stretches.back().dispatches;
+    stretches.back().samples += band.samples;
     launch(prepared, band, stream_.get());
   }
   record();
+  return stretches;
 }
 
 void CudaBackend::load_kernels(const Schedule& schedule, std::size_t events) {
@@ -250,7 +251,7 @@ void CudaBackend::make_graph(Prepared& prepared, Events events) {
   Capture capture(stream_.get());
   check(capture.begin(), "begin a graph");
   // External: a node of the graph, so that each launch of the graph takes the time anew.
-  launch_all(prepared, bands, events, cudaEventRecordExternal);
+  prepared.stretches = launch_all(prepared, bands, events, cudaEventRecordExternal);
   const CudaGraph graph = capture.end();
   check(capture.result(), "capture a graph");
   cudaGraphExec_t exec = nullptr;
@@ -265,7 +266,8 @@ void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progres
   if (progress) {
     const std::vector<Band> bands = bands_of(schedule);
     load_kernels(schedule, bands.size() + 1);
-    launch_all(of_run_, bands, Events::between_launches, cudaEventRecordDefault);
+    collect(launch_all(of_run_, bands, Events::between_launches, cudaEventRecordDefault), schedule,
+            progress);
   } else {
     if (of_run_.graph == nullptr || !same_launches(of_run_.schedule, schedule)) {
       of_run_.graph.reset();
@@ -273,15 +275,16 @@ void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progres
       make_graph(of_run_, Events::between_kernels);
     }
     check(cudaGraphLaunch(of_run_.graph.get(), stream_.get()), "launch a match");
+    collect(of_run_.stretches, schedule, progress);
   }
-  collect(schedule, progress);
 }
 
-void CudaBackend::collect(const Schedule& schedule, const Matcher::Progress& progress) {
+void CudaBackend::collect(std::span<const Stretch> stretches, const Schedule& schedule,
+                          const Matcher::Progress& progress) {
   ScheduleProgress done(schedule, progress);
   if (!progress) check(cudaStreamSynchronize(stream_.get()), "match");
-  for (std::size_t i = 0; i < stretches_.size(); ++i) {
-    const Stretch& stretch = stretches_[i];
+  for (std::size_t i = 0; i < stretches.size(); ++i) {
+    const Stretch& stretch = stretches[i];
     check(cudaEventSynchronize(events_[i + 1].get()), "match");
     float milliseconds = 0;
     check(cudaEventElapsedTime(&milliseconds, events_[i].get(), events_[i + 1].get()),

@@ -52,7 +52,7 @@ class CudaBackend final : public Backend {
     DeviceImage intensities, half_pixels;
     CudaTexture texture;  // of the half pixels; destroyed before them
   };
-  /// Consecutive launches between two events.
+  /// Consecutive launches of a kernel; the i-th of a run lies between events_ i and i + 1.
   struct Stretch {
     Kernel kernel = Kernel::initialise;
     int dispatches = 0;
@@ -64,6 +64,7 @@ class CudaBackend final : public Backend {
     Schedule schedule;
     DeviceArray<kernel::MatchParameters> parameters;
     CudaGraphExec graph;
+    std::vector<Stretch> stretches;  // of the graph
   };
 
   CurrentDevice make_current() const { return CurrentDevice(target_.ordinal, target_.name); }
@@ -75,11 +76,13 @@ class CudaBackend final : public Backend {
   void set_parameters(Prepared& prepared, const Schedule& schedule);
   std::vector<Band> bands_of(const Schedule& schedule) const;
   void load_kernels(const Schedule& schedule, std::size_t events);
-  void launch_all(const Prepared& prepared, std::span<const Band> bands, Events events,
-                  unsigned record_flags);
+  std::vector<Stretch> launch_all(const Prepared& prepared, std::span<const Band> bands,
+                                  Events events, unsigned record_flags);
   void launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const;
   void make_graph(Prepared& prepared, Events events);
-  void collect(const Schedule& schedule, const Matcher::Progress& progress);
+  /// Waits for a run and notes its times.
+  void collect(std::span<const Stretch> stretches, const Schedule& schedule,
+               const Matcher::Progress& progress);
 
   CudaTarget target_;
   std::vector<cv::Size> sizes_;
@@ -90,8 +93,7 @@ class CudaBackend final : public Backend {
   DeviceArray<unsigned> transfer_winner_;
   kernel::cuda::Context context_{};  // all but what differs by launch: pass and parameters
   std::vector<CudaEvent> events_;
-  std::vector<Stretch> stretches_;  // of the last launch_all(): between events_ i and i + 1
-  Prepared of_run_;                 // the last schedule of run()
+  Prepared of_run_;  // the last schedule of run()
   std::vector<Prepared> prepared_;
   KernelTimes times_;
 };
