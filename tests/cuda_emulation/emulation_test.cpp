@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "cuda/cuda_device.h"
+#include "cuda/cuda_target.h"
 #include "emulated_runtime.h"
 #include "error_of.h"
 #include "kernel/kernel_fixture.h"
@@ -239,8 +240,23 @@ TEST_F(CudaEmulation, MissingDevicesSayWhyAndAutoOnlyWithADriver) {
 }
 
 TEST_F(CudaEmulation, SplitsWhereADisplayLimitsTheTime) {
+  EXPECT_EQ(cuda_target(0, {}).max_samples, 0) << "no limit";
   emulation().time_limit = true;
-  EXPECT_NO_THROW(match());
+  EXPECT_GT(cuda_target(0, {}).max_samples, 0);
+  const auto kernels_of_match = [&](long max_samples) {
+    DeviceRequest request;
+    request.device = "cuda";
+    request.max_samples_per_dispatch = max_samples;
+    EXPECT_EQ(cuda_target(0, request).max_samples, max_samples);
+    Device device = Device::open(request);
+    Matcher matcher(device, rig_, options_);
+    const int before = emulation().kernels_run;
+    matcher.match(images_);
+    return emulation().kernels_run - before;
+  };
+  const int whole = kernels_of_match(1'000'000'000);
+  EXPECT_EQ(whole, static_cast<int>(make_schedule(rig_, options_).dispatches.size()));
+  EXPECT_GT(kernels_of_match(5000), whole);
 }
 
 }  // namespace
