@@ -141,6 +141,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
                       {"type", run.device.type}, {"driver", run.device.driver},
                       {"uuid", run.device.uuid}, {"bytes", run.result.device_bytes}};
   record["options"] = Json::parse(ws::to_json(run.options));
+  record["filter_used"] = ws::to_string(run.result.filter);
   record["milliseconds"] = run.result.milliseconds;
   for (const ws::KernelTime& time : run.result.times) {
     record["kernels"].push_back({{"kernel", time.kernel},

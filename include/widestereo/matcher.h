@@ -74,6 +74,7 @@ struct StereoResult {
   double milliseconds = 0;        ///< wall time of match(), uploads and downloads included
   long long samples = 0;         ///< patch samples of the schedule at full windows (an upper bound)
   std::size_t device_bytes = 0;  ///< memory taken on the device
+  Filter filter = Filter::exact;  ///< that was used: Options::filter where the device has it
 };
 
 /// `distance` with rejected pixels (reasons != 0) that were not filled set to 0.

@@ -42,7 +42,8 @@ enum class Interpolation : int {
 enum class Filter : int {
   exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
   device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their
-               ///< positions are rounded, to 1/512 pixel on most. On CPUs exact
+               ///< positions are rounded, to 1/512 pixel on most. Exact on CPUs and on Vulkan
+               ///< devices that cannot filter 32-bit floats (StereoResult::filter says which)
 };
 
 /// How planes are found.
@@ -51,6 +52,9 @@ enum class SearchMethod : int {
   pyramid =
       1,  ///< sphere sweep, coarse to fine, strips in eight directions, local plane regression
 };
+
+/// "exact" or "device".
+std::string to_string(Filter filter);
 
 /// Parameters of a match. Start from a preset and change what you need.
 struct Options {

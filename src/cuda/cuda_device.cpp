@@ -76,6 +76,7 @@ DeviceInfo describe_cuda_device(int index) {
     return info;
   }
   info.name = properties.name;
+  info.filters_intensities = true;
   info.type = properties.integrated != 0 ? "integrated gpu" : "discrete gpu";
   const std::string capability =
       std::to_string(properties.major) + "." + std::to_string(properties.minor);

@@ -28,6 +28,7 @@ void require_map(const CudaMap<T>& map, std::size_t values, const std::string& w
 DeviceInfo cuda_device() {
   DeviceInfo info;
   info.kind = DeviceKind::cuda;
+  info.filters_intensities = true;
   return info;
 }
 

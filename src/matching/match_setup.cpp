@@ -6,9 +6,8 @@
 namespace widestereo {
 namespace {
 
-/// Devices that are programs have no texture units: exact filtering costs them less.
 Options suited(Options options, const DeviceInfo& device) {
-  if (device.type == "cpu") options.filter = Filter::exact;
+  if (!device.filters_intensities) options.filter = Filter::exact;
   return options;
 }
 

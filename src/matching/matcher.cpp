@@ -154,6 +154,7 @@ class Matcher::Implementation {
     result.times = backend_->times();
     add_work(result.times, schedule);
     result.device_bytes = backend_->device_bytes();
+    result.filter = static_cast<Filter>(schedule.constants.filter);
     result.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return result;

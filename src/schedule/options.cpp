@@ -118,6 +118,8 @@ void validate(const Options& o) {
   require_between(o.fill_radius, 0, 10000, "fill radius");
 }
 
+std::string to_string(Filter filter) { return nlohmann::json(filter).get<std::string>(); }
+
 std::string to_json(const Options& o) {
   const nlohmann::ordered_json json = {{"preset", o.preset},
                                        {"min_distance", o.min_distance},

@@ -98,8 +98,8 @@ VkImageFormatProperties VulkanContext::image_limits(VkFormat format,
   return result == VK_SUCCESS ? limits : VkImageFormatProperties{};
 }
 
-bool VulkanContext::has_format(VkFormat format, VkFormatFeatureFlags features) const {
-  return widestereo::has_format(instance_functions_, handles_.physical_device, format, features);
+bool VulkanContext::filters_intensities() const {
+  return widestereo::filters_intensities(instance_functions_, handles_.physical_device);
 }
 
 std::uint32_t VulkanContext::memory_type(std::uint32_t allowed,

@@ -34,8 +34,8 @@ class VulkanContext {
 
   /// Largest extent and layer count of such an image; zeros where it is not supported at all.
   VkImageFormatProperties image_limits(VkFormat format, VkImageUsageFlags usage) const;
-  /// Whether images of this format, optimally tiled, can be used so.
-  bool has_format(VkFormat format, VkFormatFeatureFlags features) const;
+  /// Whether images of intensities can be filtered.
+  bool filters_intensities() const;
   /// First memory type of `allowed` with all of `wanted`, or VK_MAX_MEMORY_TYPES.
   std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
   /// Throws Error when a call failed; `action` completes "could not ...".

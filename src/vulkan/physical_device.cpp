@@ -55,13 +55,18 @@ std::string too_low(const char* limit, std::uint64_t needed, std::uint64_t offer
          " is needed; use another device.";
 }
 
-}  // namespace
-
 bool has_format(const InstanceFunctions& vk, VkPhysicalDevice device, VkFormat format,
                 VkFormatFeatureFlags features) {
   VkFormatProperties properties{};
   vk.vkGetPhysicalDeviceFormatProperties(device, format, &properties);
   return (properties.optimalTilingFeatures & features) == features;
+}
+
+}  // namespace
+
+bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device) {
+  return has_format(vk, device, VK_FORMAT_R32_SFLOAT,
+                    VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
 }
 
 VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysicalDevice device) {
@@ -163,6 +168,9 @@ DeviceInfo describe(const InstanceFunctions& vk, VkPhysicalDevice device, int in
   info.driver = version_text(plain.driverVersion);
   info.unusable = why_unusable(vk, device);
   if (plain.apiVersion < VK_API_VERSION_1_1) return info;
+  // Devices that are programs have no texture units: exact filtering costs them less.
+  info.filters_intensities =
+      plain.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU && filters_intensities(vk, device);
 
   VkPhysicalDeviceDriverProperties driver{};
   driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;

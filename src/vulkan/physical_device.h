@@ -32,8 +32,7 @@ std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice devic
 
 bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name);
 
-/// Whether images of this format, optimally tiled, can be used so.
-bool has_format(const InstanceFunctions& vk, VkPhysicalDevice device, VkFormat format,
-                VkFormatFeatureFlags features);
+/// Whether images of intensities can be filtered.
+bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device);
 
 }  // namespace widestereo

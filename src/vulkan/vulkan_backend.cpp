@@ -64,14 +64,10 @@ VkImageSubresourceRange layers_of(int first, std::size_t count) {
           static_cast<std::uint32_t>(count)};
 }
 
-bool filters_intensities(const VulkanContext& context) {
-  return context.has_format(intensity_format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
-}
-
 /// `sampled`: images are read as textures. Filters that the device lacks become exact.
 Pipelines make_pipelines(const VulkanContext& context, KernelConstants constants, bool sampled,
                          VkPipelineCache cache) {
-  if (!sampled || !filters_intensities(context)) {
+  if (!sampled || !context.filters_intensities()) {
     constants.filter = static_cast<int>(Filter::exact);
   }
   return Pipelines(context, constants, sampled, cache);
@@ -79,7 +75,7 @@ Pipelines make_pipelines(const VulkanContext& context, KernelConstants constants
 
 /// Exact filtering gathers, which takes no notice of the sampler's filter.
 Handle<VkSampler> make_sampler(const VulkanContext& context) {
-  const VkFilter filter = filters_intensities(context) ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
+  const VkFilter filter = context.filters_intensities() ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
   VkSamplerCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO;
   info.magFilter = filter;

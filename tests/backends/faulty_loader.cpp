@@ -15,6 +15,7 @@ PFN_vkAllocateMemory real_allocate = nullptr;
 PFN_vkQueueSubmit real_submit = nullptr;
 PFN_vkWaitForFences real_wait = nullptr;
 PFN_vkGetPhysicalDeviceProperties2 real_properties = nullptr;
+PFN_vkGetPhysicalDeviceFormatProperties real_formats = nullptr;
 PFN_vkGetPhysicalDeviceQueueFamilyProperties real_queue_families = nullptr;
 PFN_vkGetPhysicalDeviceImageFormatProperties real_image_limits = nullptr;
 
@@ -45,12 +46,20 @@ VKAPI_ATTR VkResult VKAPI_CALL no_layers(std::uint32_t* count, VkLayerProperties
   return VK_SUCCESS;
 }
 
-VKAPI_ATTR void VKAPI_CALL no_formats(VkPhysicalDevice, VkFormat, VkFormatProperties* properties) {
+VKAPI_ATTR void VKAPI_CALL formats(VkPhysicalDevice device, VkFormat format,
+                                   VkFormatProperties* properties) {
   *properties = {};
+  if (faults().no_formats) return;
+  real_formats(device, format, properties);
+  if (faults().no_filtering) {
+    properties->optimalTilingFeatures &=
+        ~static_cast<VkFormatFeatureFlags>(VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
+  }
 }
 
 VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceProperties2* out) {
   real_properties(device, out);
+  if (faults().is_gpu) out->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
   if (faults().old_device) out->properties.apiVersion = VK_API_VERSION_1_0;
   if (faults().largest_push_constants > 0) {
     out->properties.limits.maxPushConstantsSize = faults().largest_push_constants;
@@ -108,9 +117,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance(VkInstance instance, const
   if (wanted == "vkEnumerateInstanceLayerProperties" && faults().no_layers) {
     return reinterpret_cast<PFN_vkVoidFunction>(&no_layers);
   }
-  if (wanted == "vkGetPhysicalDeviceFormatProperties" && faults().no_formats) {
-    return reinterpret_cast<PFN_vkVoidFunction>(&no_formats);
-  }
+  if (wanted == "vkGetPhysicalDeviceFormatProperties") return wrap(real, real_formats, &formats);
   if (wanted == "vkGetPhysicalDeviceProperties2") {
     return wrap(real, real_properties, &properties);
   }

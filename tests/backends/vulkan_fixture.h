@@ -106,6 +106,8 @@ struct Faults {
   int failing_wait = -1;        ///< the n-th vkWaitForFences loses the device
   bool no_layers = false;
   bool no_formats = false;
+  bool no_filtering = false;  ///< images of no format can be filtered
+  bool is_gpu = false;        ///< says that it is a discrete GPU
   bool no_compute_queues = false;
   bool transfer_family = false;  ///< one more queue family, the last, which does not compute
   bool old_device = false;       ///< Vulkan 1.0

@@ -10,6 +10,8 @@
 #include "schedule/bands.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"
+#include "widestereo/matcher.h"
+#include "widestereo/synthesis.h"
 
 namespace widestereo::test {
 namespace {
@@ -257,6 +259,34 @@ TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   Schedule raster = match.schedule();
   raster.dispatches.back().kernel = Kernel::iterate_raster;
   EXPECT_THAT(error_of([&] { backend->run(raster, {}); }), HasSubstr("sequential"));
+}
+
+TEST(VulkanMatch, FiltersExactlyWhereTheDeviceCannotAndSaysSo) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const RenderedPair pair = render_demo(32);
+  Options options = Options::preset_named("fast");
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  options.sweep_steps = 4;
+  const FaultyLoader::Scope scope;
+  const auto match = [&](const Faults& faults) {
+    FaultyLoader::faults() = faults;
+    Device device(open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr()));
+    const StereoResult result =
+        Matcher(device, pair.rig, options).match(pair.views[0].image, pair.views[1].image);
+    EXPECT_THAT(device.validation_messages(), IsEmpty());
+    return result;
+  };
+  // What texture units do is not counted.
+  const auto operations = [](const StereoResult& result) {
+    double sum = 0;
+    for (const KernelTime& time : result.times) sum += time.work.operations;
+    return sum;
+  };
+  const StereoResult by_device = match({.is_gpu = true});
+  const StereoResult without = match({.no_filtering = true, .is_gpu = true});
+  EXPECT_EQ(by_device.filter, Filter::device);
+  EXPECT_EQ(without.filter, Filter::exact);
+  EXPECT_GT(operations(without), operations(by_device));
 }
 
 TEST(VulkanValidation, MissingLayerIsAnError) {

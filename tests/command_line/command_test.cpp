@@ -27,6 +27,8 @@ TEST_F(Command, DemoScoresItself) {
   EXPECT_LT(record["scores"][1]["bad_pixels"]["2.0"].get<double>(), 0.3);
   EXPECT_EQ(record["device"]["id"], "cpu");
   EXPECT_EQ(record["options"]["first_iterations"], 6);
+  EXPECT_EQ(record["options"]["filter"], "device");
+  EXPECT_EQ(record["filter_used"], "exact") << "the CPU has no texture units";
   for (const auto& entry : fs::directory_iterator(folder_ / "demo")) {
     EXPECT_EQ(entry.path().string().find(".writing"), std::string::npos) << entry.path();
   }
