@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -67,6 +68,23 @@ bool project(const Camera& camera, const Eigen::Vector3d& point, Eigen::Vector2d
 /// px between the pixel and the image's origin. Returns false when the pixel has no such ray within
 /// the model's domain and the field of view; `ray` is unspecified then.
 bool unproject(const Camera& camera, const Eigen::Vector2d& pixel, Eigen::Vector3d& ray);
+
+/// A camera for many points: the same functions, with what follows from the intrinsics alone (ends
+/// of domains are roots of polynomials) worked out once. Copies share it.
+class PreparedCamera {
+ public:
+  explicit PreparedCamera(const Camera& camera);
+  bool project(const Eigen::Vector3d& point, Eigen::Vector2d& pixel) const;
+  bool project(const Eigen::Vector3d& point, Eigen::Vector2d& pixel,
+               Eigen::Matrix<double, 2, 3>& jacobian) const;
+  bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d& ray) const;
+  /// Projects to a pixel of the image: at most half a pixel beyond the centres of the outermost.
+  bool project_into_image(const Eigen::Vector3d& point, Eigen::Vector2d& pixel) const;
+
+ private:
+  class Implementation;
+  std::shared_ptr<const Implementation> implementation_;
+};
 
 /// Largest theta (radians) that the model itself can project, whatever max_theta says.
 double model_max_theta(const Camera& camera);

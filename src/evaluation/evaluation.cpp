@@ -82,17 +82,16 @@ class SourceView {
       : camera_(source.camera), motion_(source_from_reference(source, reference)) {}
 
   bool in_image(const Eigen::Vector3d& point, Eigen::Vector2d& pixel) const {
-    return project(camera_, motion_ * point, pixel) && pixel.x() >= -0.5 && pixel.y() >= -0.5 &&
-           pixel.x() < camera_.width - 0.5 && pixel.y() < camera_.height - 0.5;
+    return camera_.project_into_image(motion_ * point, pixel);
   }
   /// How far the point's projection lies from `expected`; not_projected where it has none.
   double displacement(const Eigen::Vector3d& point, const Eigen::Vector2d& expected) const {
     Eigen::Vector2d pixel;
-    return project(camera_, motion_ * point, pixel) ? (pixel - expected).norm() : not_projected;
+    return camera_.project(motion_ * point, pixel) ? (pixel - expected).norm() : not_projected;
   }
 
  private:
-  const Camera& camera_;
+  PreparedCamera camera_;
   Eigen::Isometry3d motion_;
 };
 

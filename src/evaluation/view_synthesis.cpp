@@ -51,15 +51,15 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
   const auto cell_of = [](const cv::Point2f& place) {
     return cv::Point(static_cast<int>(place.x) / cell, static_cast<int>(place.y) / cell);
   };
+  const PreparedCamera camera(view.camera), other_camera(other.camera);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float d = distance.at<float>(y, x);
       Eigen::Vector3d ray;
       Eigen::Vector2d u;
-      if (!has_distance(d) || is_masked(view, {x, y}) || !unproject(view.camera, {x, y}, ray))
-        continue;
+      if (!has_distance(d) || is_masked(view, {x, y}) || !camera.unproject({x, y}, ray)) continue;
       const Eigen::Vector3d point = motion * (static_cast<double>(d) * ray);
-      if (!project(other.camera, point, u) || u.x() < 0 || u.y() < 0 ||
+      if (!other_camera.project(point, u) || u.x() < 0 || u.y() < 0 ||
           u.x() > other_image.cols - 1 || u.y() > other_image.rows - 1 || is_masked(other, u)) {
         continue;
       }

@@ -221,13 +221,26 @@ std::string to_string(CameraModel model) {
   return names[index];
 }
 
-bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel) {
-  return project_with(camera_parameters(camera), point, pixel);
+class PreparedCamera::Implementation {
+ public:
+  explicit Implementation(const Camera& of)
+      : camera(of), parameters(camera_parameters(of)), dual(constant(parameters)) {}
+
+  const Camera camera;
+  const kernel::precise::CameraParameters parameters;
+  const kernel::dual::CameraParameters dual;
+};
+
+PreparedCamera::PreparedCamera(const Camera& camera)
+    : implementation_(std::make_shared<const Implementation>(camera)) {}
+
+bool PreparedCamera::project(const Vector3d& point, Vector2d& pixel) const {
+  return project_with(implementation_->parameters, point, pixel);
 }
 
-bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel,
-             Eigen::Matrix<double, 2, 3>& jacobian) {
-  const kernel::dual::CameraParameters parameters = constant(camera_parameters(camera));
+bool PreparedCamera::project(const Vector3d& point, Vector2d& pixel,
+                             Eigen::Matrix<double, 2, 3>& jacobian) const {
+  const kernel::dual::CameraParameters& parameters = implementation_->dual;
   const kernel::dual::real3 variable(Dual(point.x(), Eigen::RowVector3d::UnitX()),
                                      Dual(point.y(), Eigen::RowVector3d::UnitY()),
                                      Dual(point.z(), Eigen::RowVector3d::UnitZ()));
@@ -238,8 +251,27 @@ bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel,
   return inside && pixel.allFinite();
 }
 
+bool PreparedCamera::unproject(const Vector2d& pixel, Vector3d& ray) const {
+  return unproject_with(implementation_->camera, implementation_->parameters, pixel, ray);
+}
+
+bool PreparedCamera::project_into_image(const Vector3d& point, Vector2d& pixel) const {
+  const Camera& camera = implementation_->camera;
+  return project(point, pixel) && pixel.x() >= -0.5 && pixel.y() >= -0.5 &&
+         pixel.x() < camera.width - 0.5 && pixel.y() < camera.height - 0.5;
+}
+
+bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel) {
+  return PreparedCamera(camera).project(point, pixel);
+}
+
+bool project(const Camera& camera, const Vector3d& point, Vector2d& pixel,
+             Eigen::Matrix<double, 2, 3>& jacobian) {
+  return PreparedCamera(camera).project(point, pixel, jacobian);
+}
+
 bool unproject(const Camera& camera, const Vector2d& pixel, Vector3d& ray) {
-  return unproject_with(camera, camera_parameters(camera), pixel, ray);
+  return PreparedCamera(camera).unproject(pixel, ray);
 }
 
 double model_max_theta(const Camera& camera) {

@@ -169,12 +169,13 @@ class Alignment {
     for (std::size_t i = 0; i < views.size(); ++i) {
       const BlurredView& view = views[i];
       const Eigen::Isometry3d camera_from_rig = rig_.views[i].world_from_camera.inverse();
+      const PreparedCamera camera(rig_.views[i].camera);
       for (const Point& point : points_[i]) {
         if (view.usable(point.pixel) == 0) continue;
         const Eigen::Vector3d moved = motion_ * point.position;
         Eigen::Vector2d pixel;
         Eigen::Matrix<double, 2, 3> jacobian;
-        if (!project(rig_.views[i].camera, camera_from_rig * moved, pixel, jacobian)) continue;
+        if (!camera.project(camera_from_rig * moved, pixel, jacobian)) continue;
         if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < view.now.cols - 1 &&
               pixel.y() < view.now.rows - 1) ||
             view.usable(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5)) ==

@@ -114,6 +114,7 @@ class Mean {
 struct Neighbour {
   std::size_t number;
   const View* view;
+  PreparedCamera camera;
   Eigen::Isometry3d camera_from_world;
   CloudCache::Cloud cloud;
 };
@@ -149,7 +150,8 @@ class Fusion {
  private:
   Neighbour neighbour(std::size_t number) {
     const View& view = views_[number];
-    return {number, &view, view.world_from_camera.inverse(), clouds_.get(number)};
+    return {number, &view, PreparedCamera(view.camera), view.world_from_camera.inverse(),
+            clouds_.get(number)};
   }
 
   std::uint8_t& used(const Neighbour& view, int x, int y) {
@@ -180,11 +182,10 @@ class Fusion {
             const Neighbour& other, Mean& mean, std::vector<std::uint8_t*>& joined) {
     Eigen::Vector2d position;
     const Eigen::Vector3d seen = other.camera_from_world * point.position.cast<double>();
-    if (!project(other.view->camera, seen, position)) return;
+    if (!other.camera.project_into_image(seen, position)) return;
     const cv::Mat& index = other.cloud->index;
-    const double column = std::round(position.x()), line = std::round(position.y());
-    if (!(column >= 0 && line >= 0 && column < index.cols && line < index.rows)) return;
-    const int x = static_cast<int>(column), y = static_cast<int>(line);
+    const int x = static_cast<int>(std::floor(position.x() + 0.5));
+    const int y = static_cast<int>(std::floor(position.y() + 0.5));
     const int found = index.at<int>(y, x);
     if (found == no_point) return;
     const CloudPoint& candidate = other.cloud->points[static_cast<std::size_t>(found)];
@@ -193,7 +194,7 @@ class Fusion {
       return;
     }
     const Eigen::Vector3d back = self.camera_from_world * candidate.position.cast<double>();
-    if (!project(self.view->camera, back, position)) return;
+    if (!self.camera.project(back, position)) return;
     if ((position - Eigen::Vector2d(pixel.x, pixel.y)).norm() > options_.max_pixels) return;
     const Eigen::Vector3d a = point.normal.cast<double>(), b = candidate.normal.cast<double>();
     if (degrees_between(a, b) > options_.max_normal_angle) return;

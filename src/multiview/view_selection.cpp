@@ -27,14 +27,6 @@ double worth_of_angle(double degrees) {
   return std::exp(-0.5 * x * x);
 }
 
-bool sees(const View& view, const Eigen::Isometry3d& camera_from_world,
-          const Eigen::Vector3d& point) {
-  Eigen::Vector2d pixel;
-  return project(view.camera, camera_from_world * point, pixel) && pixel.x() > -0.5 &&
-         pixel.y() > -0.5 && pixel.x() < view.camera.width - 0.5 &&
-         pixel.y() < view.camera.height - 0.5 && !is_masked(view, pixel);
-}
-
 }  // namespace
 
 std::vector<ObservedPoint> assumed_points(const std::vector<View>& views, double nearest,
@@ -54,8 +46,12 @@ std::vector<ObservedPoint> assumed_points(const std::vector<View>& views, double
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
     const Eigen::Isometry3d camera_from_world = views[i].world_from_camera.inverse();
+    const PreparedCamera camera(views[i].camera);
     for (ObservedPoint& point : points) {
-      if (sees(views[i], camera_from_world, point.position)) point.observers.push_back(i);
+      Eigen::Vector2d pixel;
+      const bool seen = camera.project_into_image(camera_from_world * point.position, pixel) &&
+                        !is_masked(views[i], pixel);
+      if (seen) point.observers.push_back(i);
     }
   }
   return points;

@@ -17,24 +17,16 @@ Ray world_ray(const View& view, const Eigen::Vector3d& ray) {
   return {view.world_from_camera.translation(), view.world_from_camera.linear() * ray};
 }
 
-/// 255 visible in the other view, 0 hidden, 128 outside its image or field of view.
-uchar visibility(const Scene& scene, const View& other, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d in_other = other.world_from_camera.inverse() * point;
-  Eigen::Vector2d pixel;
-  const bool inside = project(other.camera, in_other, pixel) && pixel.x() >= -0.5 &&
-                      pixel.y() >= -0.5 && pixel.x() < other.camera.width - 0.5 &&
-                      pixel.y() < other.camera.height - 0.5;
-  if (!inside) return 128;
-  const double distance = in_other.norm();
-  const auto hit = scene.cast(world_ray(other, in_other / distance));
-  return hit && hit->distance < distance * (1 - 1e-6) ? 0 : 255;
-}
-
 /// Renders pixels of one view.
 class ViewRenderer {
  public:
   ViewRenderer(const Scene& scene, const View& view, const View& other, std::uint32_t seed)
-      : scene_(scene), view_(view), other_(other), seed_(seed) {
+      : scene_(scene),
+        view_(view),
+        other_(other),
+        camera_(view.camera),
+        other_camera_(other.camera),
+        seed_(seed) {
     pixel_angle_ = 1 / std::max(view.camera.fx, view.camera.fy);
     const cv::Size size(view.camera.width, view.camera.height);
     result_.image = cv::Mat::zeros(size, CV_8UC3);
@@ -59,7 +51,7 @@ class ViewRenderer {
  private:
   void set_truth(int x, int y) {
     Eigen::Vector3d ray;
-    if (!unproject(view_.camera, {x, y}, ray)) return;
+    if (!camera_.unproject({x, y}, ray)) return;
     const auto hit = scene_.cast(world_ray(view_, ray));
     if (!hit) return;
     const Eigen::Vector3d normal = view_.world_from_camera.linear().transpose() * hit->normal;
@@ -69,7 +61,17 @@ class ViewRenderer {
                                                  static_cast<float>(normal.y()),
                                                  static_cast<float>(normal.z())};
     result_.truth.occlusion.at<uchar>(y, x) =
-        visibility(scene_, other_, view_.world_from_camera * (hit->distance * ray));
+        visibility(view_.world_from_camera * (hit->distance * ray));
+  }
+
+  /// 255 visible in the other view, 0 hidden, 128 outside its image or field of view.
+  uchar visibility(const Eigen::Vector3d& point) const {
+    const Eigen::Vector3d in_other = other_.world_from_camera.inverse() * point;
+    Eigen::Vector2d pixel;
+    if (!other_camera_.project_into_image(in_other, pixel)) return 128;
+    const double distance = in_other.norm();
+    const auto hit = scene_.cast(world_ray(other_, in_other / distance));
+    return hit && hit->distance < distance * (1 - 1e-6) ? 0 : 255;
   }
 
   void set_colour(int x, int y) {
@@ -78,7 +80,7 @@ class ViewRenderer {
       const double dx = (i % supersampling + 0.5) / supersampling - 0.5;
       const double dy = (i / supersampling + 0.5) / supersampling - 0.5;
       Eigen::Vector3d ray;
-      if (!unproject(view_.camera, {x + dx, y + dy}, ray)) continue;
+      if (!camera_.unproject({x + dx, y + dy}, ray)) continue;
       const Ray world = world_ray(view_, ray);
       const auto hit = scene_.cast(world);
       if (!hit) continue;
@@ -97,6 +99,7 @@ class ViewRenderer {
   const Scene& scene_;
   const View& view_;
   const View& other_;
+  PreparedCamera camera_, other_camera_;
   std::uint32_t seed_;
   double pixel_angle_;
   RenderedView result_;

@@ -284,6 +284,33 @@ TEST_F(SequencePoses, FramesWithOtherPosesAreMatchedAgain) {
   EXPECT_NE(outcome.output.find("002: "), std::string::npos) << outcome.output;
 }
 
+TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
+  const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +
+                                  " -o " + file("out") + quick + "--min-views 1 ";
+  const std::string poses = "--poses " + file("camera.txt");
+  expect_error(reconstruct, "calib.yaml is no COLMAP model");
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  const Outcome outcome = run(reconstruct + poses + " --count 2");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const auto record = [this] {
+    return nlohmann::json::parse(bytes_of(folder_ / "out/reconstruction.json"));
+  };
+  EXPECT_EQ(record()["images"].size(), 4U);
+  EXPECT_GT(record()["cloud"]["points"].get<int>(), 100);
+  // The pose of the first frame, in the file.
+  EXPECT_EQ(record()["cloud"]["origin"], (nlohmann::json{0, 0, 0.1}));
+  for (const char* name : {"000/cam0", "000/cam1", "001/cam0", "001/cam1"}) {
+    EXPECT_TRUE(fs::exists(folder_ / "out" / name / "distance0.tiff")) << name;
+  }
+  // More frames, other groups: what is still of the same images is kept.
+  ASSERT_EQ(run(reconstruct + poses).exit_code, 0);
+  EXPECT_EQ(record()["images"].size(), 6U);
+  EXPECT_TRUE(fs::exists(folder_ / "out/002/cam1/distance0.tiff"));
+  EXPECT_EQ(run(reconstruct + poses + " --views 0 --overwrite").exit_code, 0);
+  EXPECT_EQ(record()["images"].size(), 3U);
+  EXPECT_FALSE(fs::exists(folder_ / "out/000/cam1"));
+}
+
 TEST_F(SequencePoses, NeedToBeOfWhatTheCalibrationKnows) {
   expect_error(with("imu.csv", "out", "calib.yaml"), "calib.yaml does not say where that is");
   expect_error(with("camera.txt", "out", "calib.yaml") + "--poses-of imu", "T_cam_imu");

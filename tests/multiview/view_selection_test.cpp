@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+#include "widestereo/view_selection.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <set>
+
+namespace widestereo {
+namespace {
+
+using Groups = std::vector<std::vector<std::size_t>>;
+
+/// 90 degrees across, at a place, turned about the vertical.
+View view_at(double x, double degrees = 0) {
+  View view;
+  view.camera.width = view.camera.height = 101;
+  view.camera.fx = view.camera.fy = 50.5;
+  view.camera.cx = view.camera.cy = 50;
+  view.world_from_camera =
+      Eigen::Translation3d(x, 0, 0) *
+      Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitY());
+  return view;
+}
+
+TEST(AssumedPoints, LieInFrontOfTheViewsAllOverTheRange) {
+  const std::vector<View> views = {view_at(0), view_at(0, 180), view_at(0.01)};
+  const std::vector<ObservedPoint> points = assumed_points(views, 1, 16);
+  ASSERT_EQ(points.size(), 3 * 64 * 4U);
+  std::set<long> distances;
+  std::size_t shared = 0;
+  for (std::size_t i = 0; i < 64 * 4; ++i) {  // of the first view
+    const Eigen::Vector3d& position = points[i].position;
+    EXPECT_GT(position.z(), 0);
+    distances.insert(std::lround(1000 * position.norm()));
+    ASSERT_FALSE(points[i].observers.empty());
+    EXPECT_EQ(points[i].observers.front(), 0U);
+    shared += points[i].observers == std::vector<std::size_t>{0, 2};
+  }
+  EXPECT_EQ(shared, 64 * 4U) << "neither behind the camera nor beyond the other image";
+  // The middles of four equal steps of the logarithm.
+  EXPECT_EQ(distances, (std::set<long>{1414, 2828, 5657, 11314}));
+}
+
+TEST(AssumedPoints, AreNotSeenThroughMasks) {
+  std::vector<View> views = {view_at(0), view_at(0.01)};
+  views[1].mask = cv::Mat(101, 101, CV_8UC1, cv::Scalar(255));
+  views[1].mask.colRange(0, 51) = 0;
+  std::size_t shared = 0, of_second = 0;
+  for (const ObservedPoint& point : assumed_points(views, 1, 16)) {
+    if (point.observers.size() == 2) ++shared;
+    if (point.observers.back() == 1) ++of_second;
+    if (point.observers.back() == 1) {
+      EXPECT_GT(point.position.x(), 0);
+    }
+  }
+  EXPECT_EQ(shared, of_second);  // the first view sees all that the second one does
+  EXPECT_EQ(of_second, 2 * 32 * 4U);
+}
+
+TEST(ViewSelection, NeverPairsViewsOfOnePlace) {
+  const std::vector<View> views = {view_at(0), view_at(0, 10), view_at(0.5)};
+  std::vector<Eigen::Vector3d> centres;
+  for (const View& view : views) centres.push_back(view.world_from_camera.translation());
+  const ViewSelection selection(centres, assumed_points(views, 2, 10));
+  EXPECT_EQ(selection.sources(0, 5), (std::vector<std::size_t>{2}));
+  EXPECT_EQ(selection.groups(3), (Groups{{0, 2}, {1, 2}}));
+}
+
+TEST(ViewSelection, PrefersBaselinesThatSuitTheScene) {
+  std::vector<View> views;
+  std::vector<Eigen::Vector3d> centres;
+  for (int i = 0; i < 8; ++i) {
+    views.push_back(view_at(0.1 * i));
+    centres.push_back(views.back().world_from_camera.translation());
+  }
+  // 5 degrees at 3.4 m are 0.3 m in front of the cameras, and more to their sides.
+  const ViewSelection near(centres, assumed_points(views, 3.3, 3.5));
+  EXPECT_EQ(near.sources(0, 1), (std::vector<std::size_t>{4}));
+  const ViewSelection far(centres, assumed_points(views, 7.9, 8.1));
+  EXPECT_EQ(far.sources(0, 1), (std::vector<std::size_t>{7}));
+}
+
+TEST(ViewSelection, CountsObserversOnce) {
+  const std::vector<Eigen::Vector3d> centres = {{0, 0, 0}, {0.9, 0, 0}, {-0.9, 0, 0}};
+  const std::vector<ObservedPoint> points = {
+      {{0, 0, 10}, {0, 1, 1, 1}}, {{0, 0, 10}, {2, 0}}, {{0, 0, 10}, {0, 2}}};
+  EXPECT_EQ(ViewSelection(centres, points).sources(0, 2), (std::vector<std::size_t>{2, 1}));
+}
+
+}  // namespace
+}  // namespace widestereo
