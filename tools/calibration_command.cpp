@@ -156,6 +156,22 @@ void convert(const CalibrationArguments& arguments) {
   std::cout << "Wrote " << arguments.output << "\n";
 }
 
+std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
+  char text[160];
+  if (report.behind > 0.5) {
+    std::snprintf(text, sizeof text,
+                  "%.0f %% of the features lie behind the cameras; are the images in the order of "
+                  "the cameras?",
+                  100 * report.behind);
+  } else if (!(report.nearest > 0)) {
+    return "no feature is near enough and matched well enough to tell";
+  } else {
+    std::snprintf(text, sizeof text, "5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s",
+                  report.nearest, unit, report.typical, unit, report.farthest, unit);
+  }
+  return text;
+}
+
 void check(const CalibrationArguments& arguments) {
   const cv::Mat left = ws::read_image(arguments.left);
   const cv::Mat right = ws::read_image(arguments.right);
@@ -174,28 +190,32 @@ void check(const CalibrationArguments& arguments) {
                         : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"
                                                 : "too inaccurate for stereo: calibrate again";
   if (arguments.as_json) {
+    // 0: there is none
+    const auto distance = [](double value) {
+      return value > 0 ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+    };
     std::cout << nlohmann::ordered_json({{"matches", r.matches},
                                          {"median_pixels", r.median_pixels},
                                          {"median_degrees", r.median_degrees},
                                          {"below_1_pixel", r.below_1_pixel},
                                          {"below_5_pixels", r.below_5_pixels},
-                                         {"distance_p5", r.nearest},
-                                         {"distance_p50", r.typical},
-                                         {"distance_p95", r.farthest},
+                                         {"behind", r.behind},
+                                         {"distance_p5", distance(r.nearest)},
+                                         {"distance_p50", distance(r.typical)},
+                                         {"distance_p95", distance(r.farthest)},
                                          {"first_sharper_by_pixels", blur},
                                          {"verdict", verdict}})
                      .dump(2)
               << "\n";
     return;
   }
-  const char* unit = images.in_metres ? " m" : "";
   std::printf(
       "%d matched features\n"
       "epipolar error: median %.2f px, %.3f degrees; %.0f %% below 1 px, %.0f %% below 5 px\n"
-      "distances: 5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s\n"
+      "distances: %s\n"
       "calibration: %s\n",
       r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
-      r.nearest, unit, r.typical, unit, r.farthest, unit, verdict);
+      distances_of(r, images.in_metres ? " m" : "").c_str(), verdict);
   if (!sharpness) return;
   std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
               (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),

@@ -23,6 +23,9 @@ struct EpipolarReport {
   double median_degrees = 0;  ///< angle of the second ray to the epipolar plane
   double below_1_pixel = 0;   ///< share of matches
   double below_5_pixels = 0;  ///< share of matches
+  /// Share of matches whose point, at 0.3 degrees of parallax or more, lies behind the first
+  /// camera.
+  double behind = 0;
   /// Percentiles 5, 50, 95 of the distance (metres) from the first camera, over matches below 5
   /// pixels with at least 0.3 degrees of parallax; zeros without any. They suggest a distance
   /// range.

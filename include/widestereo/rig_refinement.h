@@ -46,7 +46,8 @@ struct RigRefinement {
 /// pixel of principal point. Minimises Sampson's epipolar error (Hartley, Zisserman, Multiple View
 /// Geometry, 2nd ed., section 11.4.3, with rays in place of homogeneous pixels), robustly, so that
 /// false matches do no harm. Throws Error when a pair names no two views of the rig, has fewer than
-/// 8 matches, or when the matches contradict each other.
+/// 8 matches, or when the matches contradict each other, lie behind the cameras, or move a view by
+/// more than five times the accuracy above: images of other cameras or times can be fitted, too.
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs,
                          bool intrinsics = false);
 

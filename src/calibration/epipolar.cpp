@@ -89,6 +89,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
   std::vector<double> pixels;
   std::vector<double> angles;
   std::vector<double> distances;
+  int behind = 0;
   for (const PixelMatch& match : matches) {
     Eigen::Vector3d ray_first;
     Eigen::Vector3d ray_second;
@@ -108,11 +109,12 @@ EpipolarReport check_epipolar(const View& first, const View& second,
     pixels.push_back((foot - match.second).norm());
     angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees);
     const double parallax = degrees_between(rotated, ray_second);
-    if (pixels.back() >= 5 || parallax < 0.3) continue;
+    if (parallax < 0.3) continue;
     const Eigen::Vector3d other = motion.linear().transpose() * ray_second;
     const Eigen::Vector3d centre = motion.inverse().translation();
     const double distance = triangulated_distance(ray_first, other, centre);
-    if (distance > 0) distances.push_back(distance);
+    if (distance < 0) ++behind;
+    if (distance > 0 && pixels.back() < 5) distances.push_back(distance);
   }
   if (pixels.size() < fewest_matches) {
     throw Error("Only " + std::to_string(pixels.size()) + " features match between " + first.name +
@@ -130,6 +132,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
   report.median_degrees = percentile(angles, 0.5);
   report.below_1_pixel = share_below(1);
   report.below_5_pixels = share_below(5);
+  report.behind = static_cast<double>(behind) / report.matches;
   report.nearest = percentile(distances, 0.05);
   report.typical = percentile(distances, 0.5);
   report.farthest = percentile(distances, 0.95);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <string>
 
@@ -24,6 +25,7 @@ constexpr double rotation_deviation = 0.5 / degrees;
 constexpr double direction_deviation = 2 / degrees;
 constexpr double focal_deviation = 0.002;  // a factor that all cameras share fits as well
 constexpr double centre_deviation = 1;     // pixels
+constexpr double largest_change = 5;       // deviations: what matches of other views would fit
 
 /// Unknowns of a view: its turn (radians, common frame), the shift of its centre across the line
 /// from view 0's (in units of that distance), the logarithm of its focal lengths, its principal
@@ -261,6 +263,38 @@ std::vector<EpipolarReport> check(const Rig& rig, const std::vector<ViewMatches>
   return reports;
 }
 
+[[noreturn]] void fail(const std::string& finding) {
+  throw Error(finding +
+              ", so that the rig cannot be refined; check that images matched with each other were "
+              "taken at the same time, by the calibration's cameras in its order.");
+}
+
+/// Few unknowns can be made to fit matches of views that are not those of the calibration.
+void require_credible(const RigRefinement& refined, const std::vector<ViewMatches>& pairs) {
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const EpipolarReport& report = refined.after[i];
+    if (!(report.below_5_pixels > 0.5)) fail("The matched features contradict each other");
+    if (report.behind > 0.5) {
+      fail("Most features matched between " + refined.rig.views[pairs[i].first].name + " and " +
+           refined.rig.views[pairs[i].second].name + " lie behind the cameras");
+    }
+  }
+  const auto require_small = [](double change, double deviation, const std::string& what) {
+    const double limit = largest_change * deviation * degrees;
+    if (change <= limit) return;
+    char text[128];
+    std::snprintf(text, sizeof text, " by %.1f degrees, more than the %.1f that are believed",
+                  change, limit);
+    fail("The matched features turn " + what + text);
+  };
+  for (std::size_t i = 0; i < refined.views.size(); ++i) {
+    const std::string& name = refined.rig.views[i].name;
+    require_small(refined.views[i].rotation.change, rotation_deviation, name);
+    require_small(refined.views[i].direction.change, direction_deviation,
+                  "the direction to " + name);
+  }
+}
+
 }  // namespace
 
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, bool intrinsics) {
@@ -281,15 +315,7 @@ RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, 
   result.rig = refinement.rig();
   result.views = refinement.report();
   result.after = check(result.rig, pairs);
-  const bool obeyed =
-      std::all_of(result.after.begin(), result.after.end(),
-                  [](const EpipolarReport& report) { return report.below_5_pixels > 0.5; });
-  if (!obeyed) {
-    throw Error(
-        "The matched features contradict each other, so that the rig cannot be refined; check that "
-        "images matched with each other were taken at the same time, by the calibration's cameras "
-        "in its order.");
-  }
+  require_credible(result, pairs);
   return result;
 }
 

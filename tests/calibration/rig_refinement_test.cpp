@@ -234,6 +234,30 @@ TEST(RigRefinement, BadInputHasOneSentence) {
             std::string::npos);
 }
 
+/// Views that the calibration is not of: few unknowns can be made to fit them all the same.
+TEST(RigRefinement, MatchesOfOtherViewsAreRefused) {
+  const Rig truth = true_rig();
+  const auto error = [](const Rig& rig, const std::vector<ViewMatches>& matches) {
+    return test::error_of([&] { refine_rig(rig, matches); });
+  };
+  for (const double believed : {1.0, 2.0}) {
+    EXPECT_EQ(error(displaced(truth, believed), matches_of(truth, {.noise = 0.2})), "");
+  }
+  EXPECT_NE(error(displaced(truth, 4), matches_of(truth, {.noise = 0.2}))
+                .find("turn cam1 by 4.0 degrees, more than the 2.5 that are believed"),
+            std::string::npos);
+  // The cameras stand the other way around, as if images had been swapped.
+  Rig opposite = truth;
+  for (View& view : opposite.views) {
+    Eigen::Vector3d centre = view.world_from_camera.translation();
+    centre = 2 * truth.views[0].world_from_camera.translation() - centre;
+    view.world_from_camera.translation() = centre;
+  }
+  EXPECT_NE(error(opposite, matches_of(truth, {.noise = 0.2}))
+                .find("cam0 and cam1 lie behind the cameras"),
+            std::string::npos);
+}
+
 TEST(RigRefinement, ARealRigGetsBetter) {
   if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
   const auto set = test::data_folder() / "real/vfs_t265_fs";

@@ -413,6 +413,43 @@ TEST_F(Command, CalibrationIsRefined) {
   EXPECT_FALSE(fs::exists(folder_ / "no.yaml"));
 }
 
+/// Noise 6 pixels farther to the left in the second camera.
+class ShiftedPair : public Command {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    cv::Mat noise(96, 110, CV_8UC1);
+    cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(noise, noise, {}, 1);
+    cv::imwrite(file("left.png"), noise.colRange(0, 96));
+    cv::imwrite(file("right.png"), noise.colRange(6, 102));
+  }
+  std::string calibration(const std::string& what, const std::string& a,
+                          const std::string& b) const {
+    return "calibration " + what + " " + file(a) + " " + file(b) + " -c " + file("calib.yaml") +
+           " ";
+  }
+};
+
+TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
+  const std::string output = "-o " + file("refined.yaml");
+  expect_error(calibration("refine", "right.png", "left.png") + output,
+               "so that the rig cannot be refined; check that images matched with each other were "
+               "taken at the same time, by the calibration's cameras in its order.");
+  EXPECT_FALSE(fs::exists(folder_ / "refined.yaml"));
+  Outcome outcome = run(calibration("check", "right.png", "left.png"));
+  EXPECT_NE(outcome.output.find("% of the features lie behind the cameras; are the images in the "
+                                "order of the cameras?"),
+            std::string::npos)
+      << outcome.output;
+  outcome = run(calibration("check", "left.png", "right.png"));
+  EXPECT_NE(outcome.output.find("half below "), std::string::npos) << outcome.output;
+  outcome = run(calibration("check", "left.png", "left.png"));
+  EXPECT_NE(outcome.output.find("no feature is near enough"), std::string::npos) << outcome.output;
+  outcome = run(calibration("check", "left.png", "left.png") + "--json");
+  EXPECT_TRUE(nlohmann::json::parse(outcome.output)["distance_p5"].is_null()) << outcome.output;
+}
+
 TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
   cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
   cv::imwrite(file("near.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
