@@ -2,9 +2,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <set>
 
 #include "calibration/formats.h"
 #include "text/number.h"
@@ -32,13 +34,22 @@ class Block {
     return node_[key].Scalar();
   }
 
+  /// Surplus numbers may only be zeros: what another one means would be lost.
   std::vector<double> numbers(const char* key, std::size_t count) const {
     const YAML::Node list = node_[key];
+    if (count == 0 && list && list.IsNull()) return {};
     if (!list || !list.IsSequence() || list.size() < count) {
       fail(std::string("The key ") + key + " must list " + std::to_string(count) + " numbers.");
     }
     std::vector<double> values;
-    for (std::size_t i = 0; i < count; ++i) values.push_back(number(list[i], key));
+    for (const YAML::Node& value : list) values.push_back(number(value, key));
+    if (std::any_of(values.begin() + static_cast<long>(count), values.end(),
+                    [](double value) { return value != 0; })) {
+      fail(std::string("The key ") + key + " lists " + std::to_string(values.size()) +
+           " numbers, but with these models it has " + std::to_string(count) +
+           "; correct the numbers or the models.");
+    }
+    values.resize(count);
     return values;
   }
 
@@ -111,7 +122,10 @@ void set_projection(const Block& block, Camera& camera) {
 void set_distortion(const Block& block, Camera& camera) {
   const std::string model = block.text("distortion_model", "none");
   const bool pinhole = camera.model == CameraModel::pinhole;
-  if (model == "none") return;
+  if (model == "none") {
+    if (block.has("distortion_coeffs")) block.numbers("distortion_coeffs", 0);
+    return;
+  }
   const auto unsupported = [&] {
     block.fail("The distortion_model \"" + model + "\" does not go with camera_model \"" +
                block.text("camera_model") +
@@ -140,9 +154,21 @@ void set_distortion(const Block& block, Camera& camera) {
   }
 }
 
+/// The parser keeps all of equal keys, of which a look-up finds one.
+void require_single_keys(const Document& document, const YAML::Node& map,
+                         const std::string& where) {
+  std::set<std::string> keys;
+  for (const auto& entry : map) {
+    const YAML::Node& key = entry.first;
+    if (!key.IsScalar() || keys.insert(key.Scalar()).second) continue;
+    document.fail(where + "The key " + key.Scalar() + " is there twice; leave one.");
+  }
+}
+
 View read_view(const Document& document, const std::string& name, const YAML::Node& node) {
   const Block block(document, name, node);
   if (!node.IsMap()) block.fail("It must hold keys such as camera_model and intrinsics.");
+  require_single_keys(document, node, name + ": ");
   View view;
   view.name = name;
   set_projection(block, view.camera);
@@ -173,6 +199,20 @@ std::string without_directive(std::string text) {
   return text;
 }
 
+/// No camera may be left out.
+void require_all_cameras(const Document& document, const YAML::Node& root, const Rig& rig) {
+  for (const auto& entry : root) {
+    const std::string name = entry.first.IsScalar() ? entry.first.Scalar() : "";
+    const std::string number = name.starts_with("cam") ? name.substr(3) : "";
+    if (number.empty() || number.find_first_not_of("0123456789") != std::string::npos) continue;
+    if (std::none_of(rig.views.begin(), rig.views.end(),
+                     [&name](const View& view) { return view.name == name; })) {
+      document.fail("It has " + name + " but no cam" + std::to_string(rig.views.size()) +
+                    "; number the cameras from cam0 without gaps.");
+    }
+  }
+}
+
 }  // namespace
 
 Rig read_kalibr(const Document& document) {
@@ -180,6 +220,7 @@ Rig read_kalibr(const Document& document) {
     const YAML::Node root = YAML::Load(without_directive(document.text));
     if (!root.IsMap())
       document.fail("It holds no cameras; a Kalibr camchain has keys cam0, cam1, ...");
+    require_single_keys(document, root, "");
     Rig rig;
     for (int i = 0; i < 1000; ++i) {
       const std::string name = "cam" + std::to_string(i);
@@ -196,6 +237,7 @@ Rig read_kalibr(const Document& document) {
       if (from_imu && !rig.world_from_imu) rig.world_from_imu = view.world_from_camera * *from_imu;
       rig.views.push_back(view);
     }
+    require_all_cameras(document, root, rig);
     if (rig.views.empty()) {
       document.fail("It holds no cameras; a Kalibr camchain has keys cam0, cam1, ...");
     }

@@ -451,6 +451,19 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
          "cam0: T_cam_imu is not a rigid motion");
   expect(replaced(with_imu("cam1", "T_imu_cam"), "-0.04", ".nan"), "cam1: The key T_imu_cam");
   expect(replaced(kalibr_text, "max_theta_deg: 97.5", "max_theta_deg: 400"), "max_theta");
+  expect(replaced(kalibr_text, "256.89]", "256.89, 7]"),
+         "cam0: The key intrinsics lists 5 numbers, but with these models it has 4");
+  expect(replaced(kalibr_text, "-0.002, 0.0002]", "-0.002, 0.0002, 0, 0.5]"),
+         "cam0: The key distortion_coeffs lists 6 numbers");
+  expect(replaced(kalibr_text, "distortion_coeffs: []", "distortion_coeffs: [0.1]"),
+         "cam1: The key distortion_coeffs lists 1 numbers");
+  EXPECT_EQ(message(replaced(kalibr_text, "-0.002, 0.0002]", "-0.002, 0.0002, 0, 0.0]")), "");
+  EXPECT_EQ(message(replaced(kalibr_text, "distortion_coeffs: []", "distortion_coeffs:")), "");
+  expect(replaced(kalibr_text, "cam1:", "cam2:"), "It has cam2 but no cam1");
+  expect(replaced(kalibr_text, "cam0:", "cam2:"), "It has cam2 but no cam0");
+  expect(replaced(kalibr_text, "cam1:", "cam0:"), "The key cam0 is there twice");
+  expect(replaced(kalibr_text, "  rostopic:", "  resolution:"),
+         "cam0: The key resolution is there twice");
   expect(replaced(replaced(replaced(kalibr_text, "-0.10106110275180535", "0"),
                            "-0.0019764575873431013", "0"),
                   "-0.0011756424802046581", "0"),
