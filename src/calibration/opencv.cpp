@@ -205,6 +205,10 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
          {"D2", "distCoeffs2", "dist_coeffs_2", "D_right", "distortion_right"},
          {"xi2", "xi_right"}},
         size);
+    if ((rig.views[0].camera.model == CameraModel::mei) !=
+        (rig.views[1].camera.model == CameraModel::mei)) {
+      document.fail("It has a xi of one camera alone; add the other's (xi1, xi2), or remove it.");
+    }
     rig.views[1].world_from_camera = second_from_first(storage, document).inverse();
     return rig;
   } catch (const cv::Exception& error) {

@@ -481,6 +481,8 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect(replaced(opencv_text, "[ 1., 0., 0., 0., 1.", "[ 1., 0., 0., 0., 2."), "rigid");
   expect(replaced(opencv_text, "[ -0.125, 0., 0. ]", "[ 0., 0., 0. ]"), "baseline");
   expect(replaced(opencv_text, "-0.028", ".Nan"), "");
+  expect(std::string(opencv_text) + "xi1: 1.2\n", "It has a xi of one camera alone");
+  expect(std::string(opencv_text) + "xi2: 1.2\n", "It has a xi of one camera alone");
   expect(replaced(opencv_text, "rows: 3", "rows: 1900000000"), "rows");
 }
 
