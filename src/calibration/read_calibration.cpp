@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <sstream>
+#include <string_view>
 #include <system_error>
 
 #include "calibration/formats.h"
@@ -66,6 +68,52 @@ Document load(const std::filesystem::path& path) {
   return {path, text.str()};
 }
 
+/// How deep brackets, or the elements of XML, lie in each other at most.
+int nesting_of(std::string_view text) {
+  const bool xml = text.substr(0, text.find_first_not_of(" \t\r\n\xEF\xBB\xBF") + 1).ends_with('<');
+  int depth = 0;
+  int deepest = 0;
+  std::size_t i = 0;
+  const auto next_is = [&](std::string_view what) { return text.substr(i).starts_with(what); };
+  const auto skip_to = [&](std::size_t end) { i = std::min(end, text.size()); };
+  for (; i < text.size(); ++i) {
+    const char c = text[i];
+    if (xml) {
+      if (next_is("<!--")) {
+        skip_to(text.find("-->", i));
+      } else if (next_is("</") || next_is("/>")) {
+        depth = std::max(depth - 1, 0);
+      } else if (c == '<' && !next_is("<?")) {
+        ++depth;
+      }
+    } else if (c == '#' || next_is("//")) {
+      skip_to(text.find('\n', i));
+    } else if (next_is("/*")) {
+      skip_to(text.find("*/", i));
+    } else if (c == '"' || c == '\'') {
+      std::size_t end = i + 1;
+      while (end < text.size() && text[end] != c && text[end] != '\n') {
+        end += c == '"' && text[end] == '\\' ? 2 : 1;
+      }
+      skip_to(end);
+    } else if (c == '[' || c == '{') {
+      ++depth;
+    } else if (c == ']' || c == '}') {
+      depth = std::max(depth - 1, 0);
+    }
+    deepest = std::max(deepest, depth);
+  }
+  return deepest;
+}
+
+/// OpenCV's parsers call themselves at each level, until the stack is full.
+void require_shallow(const Document& document) {
+  constexpr int deepest = 100;
+  if (nesting_of(document.text) <= deepest) return;
+  document.fail("Its contents are nested more than " + std::to_string(deepest) +
+                " levels deep, which no calibration is; is it damaged?");
+}
+
 bool contains(const Document& document, const char* text) {
   return document.text.find(text) != std::string::npos;
 }
@@ -106,6 +154,7 @@ CalibrationFormat format_of(const Document& document) {
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size) {
   using namespace calibration;
   const Document document = load(path);
+  require_shallow(document);
   Calibration result;
   result.format = format_of(document);
   switch (result.format) {

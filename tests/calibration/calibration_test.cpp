@@ -505,6 +505,34 @@ TEST(BadCalibration, PolynomialModelsAreNamed) {
       "WoodScape");
 }
 
+/// Parsers that call themselves for what is nested would fill the stack.
+TEST(BadCalibration, DeepNestingIsRefused) {
+  const TemporaryFolder folder;
+  const auto repeated = [](const std::string& text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  const std::string xml = "<?xml version=\"1.0\"?>\n<opencv_storage><!-- opencv-matrix <a <a -->";
+  for (const std::string& text :
+       {"%YAML:1.0\n---\nK1: !!opencv-matrix\n   data: " + repeated("[", 200'000),
+        "{\"x\": \"opencv-matrix\", \"a\": " + repeated("[", 200'000),
+        "{\"x\": \"opencv-matrix\", \"a\": " + repeated("[\"]\", /*]*/ ", 200'000),
+        "{\"x\": \"opencv-matrix\", \"a\": " + repeated("[\"\\\"]\", // ]\n", 200'000),
+        xml + repeated("<a>", 200'000) + repeated("</a>", 200'000) + "</opencv_storage>"}) {
+    EXPECT_NE(error_of(folder.write("deep", text)).find("nested more than 100 levels"),
+              std::string::npos);
+  }
+  // Many, but beside each other.
+  for (const std::string& text :
+       {opencv_text + repeated("many: [ {} ] # [\n", 1000),
+        xml + repeated("<a><b/>'\"</a>", 1000) + "</opencv_storage>",
+        replaced(basalt_text, "\"vignette\": []",
+                 "\"vignette\": [" + repeated("[\"[\", {}],\n", 1000) + "[]]")}) {
+    EXPECT_EQ(error_of(folder.write("wide", text)).find("nested"), std::string::npos);
+  }
+}
+
 /// Whatever bytes come, the reader answers with a rig or an Error.
 TEST(BadCalibration, DamagedFilesNeverCrash) {
   const TemporaryFolder folder;
