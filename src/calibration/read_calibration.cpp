@@ -46,8 +46,13 @@ constexpr std::uintmax_t largest_file = 16 << 20;
 
 Document load(const std::filesystem::path& path) {
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) {
+  const std::filesystem::file_type type = std::filesystem::status(path, error).type();
+  if (type == std::filesystem::file_type::not_found) {
     throw Error("There is no calibration file " + path.string() + "; check the path.");
+  }
+  if (type == std::filesystem::file_type::none) {
+    throw Error("Cannot read " + path.string() + " (" + error.message() +
+                "); check the permissions of its folder.");
   }
   if (is_colmap_model(path)) {
     throw Error(
@@ -55,7 +60,7 @@ Document load(const std::filesystem::path& path) {
         " is a COLMAP model, which calibrates images; only `depth`, `calibration check` and "
         "`view-synthesis` take it.");
   }
-  if (!std::filesystem::is_regular_file(path, error)) {
+  if (type != std::filesystem::file_type::regular) {
     throw Error(path.string() + " is not a file; give a calibration file.");
   }
   if (std::filesystem::file_size(path, error) > largest_file) {

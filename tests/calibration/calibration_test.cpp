@@ -2,6 +2,7 @@
 #include "widestereo/calibration.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
@@ -531,6 +532,17 @@ TEST(BadCalibration, DeepNestingIsRefused) {
                  "\"vignette\": [" + repeated("[\"[\", {}],\n", 1000) + "[]]")}) {
     EXPECT_EQ(error_of(folder.write("wide", text)).find("nested"), std::string::npos);
   }
+}
+
+TEST(BadCalibration, UnreadableFoldersAreNamed) {
+  if (geteuid() == 0) GTEST_SKIP() << "permissions do not hold for root";
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "closed");
+  folder.write("closed/calib.yaml", kalibr_text);
+  std::filesystem::permissions(folder / "closed", std::filesystem::perms::none);
+  const std::string error = error_of(folder / "closed/calib.yaml");
+  std::filesystem::permissions(folder / "closed", std::filesystem::perms::owner_all);
+  EXPECT_NE(error.find("calib.yaml (Permission denied)"), std::string::npos) << error;
 }
 
 /// Whatever bytes come, the reader answers with a rig or an Error.
