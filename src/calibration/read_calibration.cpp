@@ -7,6 +7,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "calibration/colmap_files.h"
 #include "calibration/formats.h"
 #include "geometry/validation.h"
 #include "widestereo/colmap.h"
@@ -44,6 +45,15 @@ namespace {
 
 constexpr std::uintmax_t largest_file = 16 << 20;
 
+void require_no_part_of_a_model(const std::filesystem::path& folder) {
+  const bool has_cameras = !colmap_file(folder, "cameras").empty();
+  const bool has_images = !colmap_file(folder, "images").empty();
+  if (!has_cameras && !has_images) return;
+  const std::string missing = has_cameras ? "images" : "cameras";
+  throw Error(folder.string() + " is no whole COLMAP model: " + missing + ".bin or " + missing +
+              ".txt is missing; give the folder that has cameras and images.");
+}
+
 Document load(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::file_type type = std::filesystem::status(path, error).type();
@@ -60,6 +70,7 @@ Document load(const std::filesystem::path& path) {
         " is a COLMAP model, which calibrates images; only `depth`, `calibration check` and "
         "`view-synthesis` take it.");
   }
+  require_no_part_of_a_model(path);
   if (type != std::filesystem::file_type::regular) {
     throw Error(path.string() + " is not a file; give a calibration file.");
   }

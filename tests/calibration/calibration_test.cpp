@@ -545,6 +545,13 @@ TEST(BadCalibration, UnreadableFoldersAreNamed) {
   EXPECT_NE(error.find("calib.yaml (Permission denied)"), std::string::npos) << error;
 }
 
+TEST(BadCalibration, WhatAColmapModelLacksIsNamed) {
+  const TemporaryFolder folder;
+  folder.write("cameras.txt", "");
+  const std::string error = error_of(folder.path());
+  EXPECT_NE(error.find("images.bin or images.txt is missing"), std::string::npos) << error;
+}
+
 /// Whatever bytes come, the reader answers with a rig or an Error.
 TEST(BadCalibration, DamagedFilesNeverCrash) {
   const TemporaryFolder folder;
