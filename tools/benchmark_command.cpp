@@ -8,6 +8,7 @@
 #include "benchmark_plot.h"
 #include "commands.h"
 #include "match_settings.h"
+#include "option_checks.h"
 #include "roofline.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -171,15 +172,15 @@ void add_benchmark_command(CLI::App& app) {
   command
       ->add_option("--peak-gflops", a->peaks.gflops,
                    "The device's peak, 10^9 FP32 operations a second, a multiply-add being two")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command
       ->add_option("--peak-gtexels", a->peaks.gtexels,
                    "The device's peak, 10^9 texels of four bytes a second")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command
       ->add_option("--peak-gbps", a->peaks.gbps,
                    "The device's peak, 10^9 bytes a second to and from its memory")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("-o,--output", a->output, "JSON file to write");
   command->add_option("--plot", a->plot, "Picture to write, .svg")
       ->check([](const std::string& name) -> std::string {

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "commands.h"
+#include "option_checks.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -128,7 +129,7 @@ void add_evaluate_command(CLI::App& app) {
       ->add_option("--far-distance", a->far_distance,
                    "Also prints how much of what has no ground truth, such as a sky, comes out "
                    "at this distance (metres) to within 2 px")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   command->add_option("--field-of-view", a->field_of_view,
                       "Mask, 0 = outside the lens; for --far-distance");
   command->add_option("-c,--calibration", a->calibration, "Calibration of the views");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "frame_settings.h"
 
+#include "option_checks.h"
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
@@ -8,15 +9,15 @@ namespace ws = widestereo;
 void FrameSettings::add_to(CLI::App& command) {
   const std::string group = "Frames";
   command.add_option("--first", first, "First frame, counted from 0")
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->capture_default_str()
       ->group(group);
   command.add_option("--count", count, "Number of frames at most, 0 = all")
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->capture_default_str()
       ->group(group);
   command.add_option("--step", step, "Take every so many frames")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->group(group);
   command.add_flag("--skip-incomplete", skip_incomplete, "Leave out frames that a camera lacks")

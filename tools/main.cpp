@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "commands.h"
+#include "option_checks.h"
 #include "widestereo/error.h"
 
 namespace {
@@ -33,6 +34,7 @@ int main(int argc, char** argv) {
   add_devices_command(app);
   add_benchmark_command(app);
   end_options_after_a_word(app);
+  check_words_of(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <numeric>
 
+#include "option_checks.h"
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
@@ -25,7 +26,7 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
   command
       .add_option("--poses-tolerance", tolerance,
                   "Largest difference of time between image and pose, seconds")
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->capture_default_str()
       ->group(group);
 }

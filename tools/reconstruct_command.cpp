@@ -12,6 +12,7 @@
 #include "commands.h"
 #include "match_settings.h"
 #include "matching_run.h"
+#include "option_checks.h"
 #include "posed_images.h"
 #include "progress_bar.h"
 #include "result_folder.h"
@@ -295,20 +296,20 @@ void add_reconstruct_command(CLI::App& app) {
   command
       ->add_option("--min-views", a->fusion.min_views,
                    "Images that must have a point, at least, for it to be in the cloud")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->group(fusion);
   command
       ->add_option("--fusion-relative", a->fusion.max_relative,
                    "Largest difference of distance between images that have the same point, share")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->group(fusion);
   command
       ->add_option("--fusion-pixels", a->fusion.max_pixels,
                    "Largest displacement between them, "
                    "pixels")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->group(fusion);
   a->format.add_for_fused_images_to(*command);

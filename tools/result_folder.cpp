@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "option_checks.h"
 #include "widestereo/image_io.h"
 #include "widestereo/pictures.h"
 #include "widestereo/point_cloud.h"
@@ -191,7 +192,7 @@ void FolderFormat::add_maps_to(CLI::App& command) {
       ->capture_default_str()
       ->group(group);
   command.add_option("--png-scale", png_scale, "Units per metre of 16-bit PNG distances")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->group(group);
 }

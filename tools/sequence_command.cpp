@@ -14,6 +14,7 @@
 #include "frame_settings.h"
 #include "match_settings.h"
 #include "matching_run.h"
+#include "option_checks.h"
 #include "pose_settings.h"
 #include "progress_bar.h"
 #include "result_folder.h"

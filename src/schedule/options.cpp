@@ -25,9 +25,15 @@ NLOHMANN_JSON_SERIALIZE_ENUM(Propagation, {{Propagation::checkerboard, "checkerb
 
 namespace {
 
+/// JSON has neither NaN nor infinity.
+std::string text(double number) {
+  if (std::isnan(number)) return "not a number (NaN)";
+  if (std::isinf(number)) return number > 0 ? "infinite" : "minus infinity";
+  return nlohmann::json(number).dump();
+}
+
 void require_between(double value, double low, double high, const std::string& name) {
   if (value >= low && value <= high) return;  // false for NaN
-  const auto text = [](double number) { return nlohmann::json(number).dump(); };
   throw Error("The option " + name + " is " + text(value) + "; it must lie between " + text(low) +
               " and " + text(high) + ".");
 }
@@ -74,8 +80,7 @@ void validate(const Options& o) {
   if (!std::isfinite(o.min_distance) || !std::isfinite(o.max_distance) || o.min_distance <= 0 ||
       o.max_distance <= o.min_distance) {
     throw Error(
-        "The distance range " + nlohmann::json(o.min_distance).dump() + " to " +
-        nlohmann::json(o.max_distance).dump() +
+        "The distance range from " + text(o.min_distance) + " to " + text(o.max_distance) +
         " m is not usable: give a positive nearest and a larger, finite farthest distance.");
   }
   require_between(o.window_radius, 1, 15, "window radius");

@@ -167,8 +167,6 @@ TEST_F(Command, BadCalibrationsAndOptionsAreNamed) {
                             file("calib.yaml") + " -o " + file("out") + " --device cpu";
   expect_error(plain + " --min-distance -1", "distance range");
   expect_error(plain + " --min-distance 5 --max-distance 2", "distance range");
-  expect_error(plain + " --max-distance inf", "distance range");
-  expect_error(plain + " --max-distance nan", "distance range");
   expect_error(plain + " --window-radius 99", "window radius");
   expect_error(plain + "x", "cpux");
   expect_error("depth " + file("left.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
@@ -177,6 +175,55 @@ TEST_F(Command, BadCalibrationsAndOptionsAreNamed) {
   EXPECT_NE(run("depth " + file("left.png")).exit_code, 0);
   EXPECT_NE(run("depth " + file("left.png") + " --no-such-option").exit_code, 0);
   EXPECT_NE(run(plain + " --preset nonsense").exit_code, 0);
+}
+
+/// Refused while the command line is read, naming the option; nothing is written.
+class RefusedWords : public Command {
+ protected:
+  void expect_refusal(const std::string& arguments, const std::string& part) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_NE(outcome.exit_code, 0) << arguments << "\n" << outcome.output;
+    EXPECT_NE(outcome.output.find(part), std::string::npos) << arguments << "\n" << outcome.output;
+    EXPECT_LT(outcome.output.size(), 250u) << outcome.output;
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << arguments;
+  }
+  std::string sequence() const {
+    return "sequence " + file("data") + " -c " + file("calib.yaml") + " -o " + file("out") + " ";
+  }
+};
+
+TEST_F(RefusedWords, NumbersAreFinite) {
+  for (const char* option :
+       {"--max-theta", "--min-distance", "--max-distance", "--png-scale", "--blur", "--max-cost",
+        "--min-parallax", "--weight-scale", "--consistency-pixels"}) {
+    for (const char* word : {"nan", "-NaN", "inf", "-Infinity", "1e999"}) {
+      expect_refusal(depth_of("left.png", "right.png") + option + " " + word,
+                     std::string(option) + ": " + word + " is no finite number");
+    }
+  }
+  expect_refusal(depth_of("left.png", "right.png") + "--blur 0.5,nan", "--blur: nan is no finite");
+  expect_refusal(sequence() + "--restart-below nan", "--restart-below: nan is no finite number");
+  expect_refusal("benchmark --devices cpu --peak-gflops nan", "--peak-gflops: nan");
+  expect_refusal("evaluate a.tiff --far-distance nan", "--far-distance: nan");
+}
+
+TEST_F(RefusedWords, NoneIsEmpty) {
+  for (const char* option : {"--min-distance", "--seed", "--levels", "--level-iterations",
+                             "--poses", "--mask", "--device", "--views", "--blur"}) {
+    expect_refusal(depth_of("left.png", "right.png") + option + " ''",
+                   std::string(option) + ": the value is empty");
+  }
+  expect_refusal("depth '' " + file("right.png") + " -c x -o " + file("out"),
+                 "images: the value is empty");
+  expect_refusal("benchmark --devices cpu --sizes 64 -o ''", "--output: the value is empty");
+}
+
+TEST_F(RefusedWords, LimitsAreShort) {
+  expect_refusal(sequence() + "--first -1", "--first: -1 is no number from 0 on");
+  expect_refusal(sequence() + "--count -1", "--count: -1 is no number from 0 on");
+  expect_refusal(sequence() + "--step 0", "--step: 0 is no number above 0");
+  expect_refusal(depth_of("left.png", "right.png") + "--png-scale 0",
+                 "--png-scale: 0 is no number above 0");
 }
 
 TEST_F(Command, ImagesWithoutOverlapAreRefused) {
