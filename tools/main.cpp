@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 
 #include "commands.h"
@@ -14,6 +15,18 @@ void end_options_after_a_word(CLI::App& app) {
     if (!option->get_positional()) option->allow_extra_args(false);
   }
   for (CLI::App* command : app.get_subcommands(nullptr)) end_options_after_a_word(*command);
+}
+
+/// What is wrong with the word in place of a command, empty if nothing is.
+std::string unknown_command(const CLI::App& app) {
+  const std::vector<CLI::App*> parsed = app.get_subcommands();
+  if (!parsed.empty()) return unknown_command(*parsed.front());
+  if (app.get_require_subcommand_min() == 0 || app.remaining().empty()) return "";
+  std::string path;
+  for (const CLI::App* group = &app; group->get_parent() != nullptr; group = group->get_parent()) {
+    path = " " + group->get_name() + path;
+  }
+  return app.remaining().front() + " is no command; `widestereo" + path + " --help` lists them.";
 }
 
 }  // namespace
@@ -37,6 +50,11 @@ int main(int argc, char** argv) {
   check_words_of(app);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::RequiredError& error) {
+    const std::string unknown = unknown_command(app);
+    if (unknown.empty()) return app.exit(error);
+    std::cerr << "widestereo: " << unknown << "\n";
+    return error.get_exit_code();
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   } catch (const widestereo::Error& error) {
@@ -44,6 +62,10 @@ int main(int argc, char** argv) {
     return 1;
   } catch (const std::bad_alloc&) {
     std::cerr << "widestereo: Not enough memory; use smaller images.\n";
+    return 1;
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::cerr << "widestereo: Cannot use " << error.path1().string() << ": "
+              << error.code().message() << "; check its permissions.\n";
     return 1;
   } catch (const std::exception& error) {
     std::cerr << "widestereo: Internal error: " << error.what() << "\n";

@@ -226,6 +226,19 @@ TEST_F(RefusedWords, LimitsAreShort) {
                  "--png-scale: 0 is no number above 0");
 }
 
+TEST_F(Command, UnknownCommandsAreNamed) {
+  const auto expect = [](const std::string& arguments, const std::string& message) {
+    const Outcome outcome = run(arguments);
+    EXPECT_NE(outcome.exit_code, 0);
+    EXPECT_EQ(outcome.output, "widestereo: " + message + "\n");
+  };
+  expect("foo", "foo is no command; `widestereo --help` lists them.");
+  expect("foo l.png -o x", "foo is no command; `widestereo --help` lists them.");
+  expect("calibration foo x.yaml",
+         "foo is no command; `widestereo calibration --help` lists them.");
+  EXPECT_EQ(run("foo --help").exit_code, 0);
+}
+
 TEST_F(Command, ImagesWithoutOverlapAreRefused) {
   std::string text;
   {
