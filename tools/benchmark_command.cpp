@@ -107,6 +107,9 @@ void replace(ws::DevicePeaks& peaks, const ws::DevicePeaks& given) {
 
 void run_benchmark(BenchmarkArguments a) {
   require_one_device(a);
+  for (const std::string& file : {a.output, a.plot}) {
+    if (!file.empty()) ws::require_writable(file);
+  }
   if (a.devices.empty()) {
     for (const ws::DeviceInfo& device : ws::Device::list()) {
       if (device.unusable.empty()) a.devices.push_back(device.id);

@@ -305,6 +305,7 @@ void refine(const CalibrationArguments& arguments) {
                     " image(s); give one image of each camera, frame after frame, of two cameras "
                     "or more.");
   }
+  ws::require_writable(arguments.output);
   const std::vector<ws::ViewMatches> pairs = match_frames(rig, arguments.images);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);
   write(arguments, refined.rig);

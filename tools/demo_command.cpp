@@ -25,7 +25,6 @@ struct DemoArguments {
 };
 
 void run_demo(DemoArguments arguments) {
-  ws::prepare_output_folder(arguments.output);
   const ws::RenderedPair pair = ws::render_demo(arguments.size);
   const auto [nearest, farthest] = ws::demo_distance_range();
   if (!arguments.settings.min_distance) arguments.settings.min_distance = nearest;
@@ -37,7 +36,7 @@ void run_demo(DemoArguments arguments) {
     images.push_back(view.image);
     truths.push_back(view.truth);
   }
-  const MatchingRun run = match_images(arguments.settings, pair.rig, images);
+  const MatchingRun run = match_images(arguments.settings, pair.rig, images, arguments.output);
   FolderContents contents{.rig = pair.rig, .images = images, .run = run};
   contents.truths = truths;
   contents.origin = {{"scene", "demo"}, {"size", arguments.size}};

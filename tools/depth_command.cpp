@@ -63,14 +63,16 @@ void run_depth(const DepthArguments& arguments) {
   for (const std::string& file : files) images.push_back(ws::read_image(file));
   ws::CalibratedImages calibrated =
       calibrated_images(arguments.rig, arguments.poses, files, images.front().size());
-  arguments.rig.leave_out_dark_rims(calibrated.rig, images);
   const ws::Rig& rig = calibrated.rig;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    ws::require_calibrated_size(images[i], rig.views[i], files[i]);
+  }
+  arguments.rig.leave_out_dark_rims(calibrated.rig, images);
   const MatchSettings settings =
       with_range(arguments.settings, calibrated, arguments.rig.calibration);
-  ws::prepare_output_folder(arguments.output);
 
   const std::vector<double> blurs = arguments.sharpness.blurs(rig, images);
-  const MatchingRun run = match_images(settings, rig, blurred(images, blurs));
+  const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);
   FolderContents contents{
       .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres, .blurs = blurs};
   contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};

@@ -5,6 +5,7 @@
 
 #include "progress_bar.h"
 #include "widestereo/error.h"
+#include "widestereo/image_io.h"
 
 namespace ws = widestereo;
 
@@ -36,12 +37,13 @@ void require_no_validation_messages(const ws::Device& device) {
 }
 
 MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
-                         const std::vector<cv::Mat>& images) {
+                         const std::vector<cv::Mat>& images, const std::string& output) {
   MatchingRun run;
   run.options = settings.options();
   ws::Device device = open_device(settings);
   run.device = device.info();
   ws::Matcher matcher(device, rig, run.options);
+  ws::prepare_output_folder(output);
   {
     ProgressBar bar("Matching on " + device.info().name);
     run.result = matcher.match(images, [&bar](double share) { bar.show(share); });

@@ -28,6 +28,7 @@ widestereo::Device open_device(const MatchSettings& settings);
 /// Throws Error when validation was asked for and reported anything.
 void require_no_validation_messages(const widestereo::Device& device);
 
-/// Throws Error also when validation was asked for and reported anything.
+/// Throws Error also when validation was asked for and reported anything. Once nothing else can be
+/// wrong with the request, and before the work, the output folder is prepared.
 MatchingRun match_images(const MatchSettings& settings, const widestereo::Rig& rig,
-                         const std::vector<cv::Mat>& images);
+                         const std::vector<cv::Mat>& images, const std::string& output);

@@ -16,6 +16,9 @@ void write_atomically(const std::filesystem::path& path,
 /// Creates the folder (and parents) if needed and checks that files can be made in it.
 void prepare_output_folder(const std::filesystem::path& folder);
 
+/// Throws Error where a file cannot be written, for those that are written after long work.
+void require_writable(const std::filesystem::path& file);
+
 /// Reads an 8- or 16-bit image, grey or BGR, depth kept. Throws Error (missing, truncated, no
 /// image).
 cv::Mat read_image(const std::filesystem::path& path);

@@ -30,15 +30,21 @@ struct RemoveOnExit {
   }
 };
 
+void require_folder_of(const fs::path& path) {
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  std::error_code error;
+  if (fs::is_directory(folder, error)) return;
+  throw Error("Cannot write " + path.string() + ": the folder " + folder.string() +
+              " does not exist; create it first.");
+}
+
+bool can_make(const fs::path& file) { return !!std::ofstream(file).put('\n').flush(); }
+
 }  // namespace
 
 void write_atomically(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  require_folder_of(path);
   std::error_code error;
-  if (!fs::is_directory(folder, error)) {
-    throw Error("Cannot write " + path.string() + ": the folder " + folder.string() +
-                " does not exist; create it first.");
-  }
   const RemoveOnExit temporary{temporary_beside(path)};
   write(temporary.path);
   fs::rename(temporary.path, path, error);
@@ -56,9 +62,21 @@ void prepare_output_folder(const fs::path& folder) {
                 (error ? ": " + error.message() : "") + "; choose another one.");
   }
   const RemoveOnExit probe{temporary_beside(folder / "probe.txt")};
-  if (!std::ofstream(probe.path).put('\n').flush()) {
+  if (!can_make(probe.path)) {
     throw Error("Cannot write into the output folder " + folder.string() +
                 "; check its permissions and free space, or choose another one.");
+  }
+}
+
+void require_writable(const fs::path& file) {
+  require_folder_of(file);
+  std::error_code error;
+  const RemoveOnExit probe{temporary_beside(file)};
+  if (fs::is_directory(file, error) || !can_make(probe.path)) {
+    throw Error("Cannot write " + file.string() +
+                (fs::is_directory(file, error)
+                     ? ", which is a folder; give a file."
+                     : "; check the folder's permissions and free space."));
   }
 }
 

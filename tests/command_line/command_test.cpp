@@ -239,6 +239,31 @@ TEST_F(Command, UnknownCommandsAreNamed) {
   EXPECT_EQ(run("foo --help").exit_code, 0);
 }
 
+/// Nothing is wrong with the folder, so it is not made before all else is found right.
+TEST_F(Command, RefusedRequestsLeaveNoFolder) {
+  const std::string depth = "depth " + file("left.png") + " " + file("right.png") + " -c " +
+                            file("calib.yaml") + " -o " + file("out") + " ";
+  cv::imwrite(file("one.png"), cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)));
+  expect_error(depth + "--device cpu --levels 4", "level iterations");
+  expect_error(depth + "--device cpux", "cpux");
+  expect_error("depth " + file("one.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
+                   " -o " + file("out") + " --device cpu",
+               file("one.png") + " is 1x1 pixels");
+  expect_error("demo --size 64 --device cpu --levels 4 -o " + file("out"), "level iterations");
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+}
+
+TEST_F(Command, BenchmarkFindsOutFirstWhetherItCanWrite) {
+  const std::string common = "benchmark --devices none --presets fast --sizes 64 ";
+  expect_error(common + "-o " + file("nothere/x.json"), "nothere does not exist");
+  expect_error(common + "--plot " + file("nothere/x.svg"), "nothere does not exist");
+  fs::create_directory(folder_ / "folder.json");
+  expect_error(common + "-o " + file("folder.json"), "folder.json, which is a folder");
+  EXPECT_NE(run(common + "-o " + file("x.json")).output.find("There is no device \"none\""),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(folder_ / "x.json"));
+}
+
 TEST_F(Command, ImagesWithoutOverlapAreRefused) {
   std::string text;
   {
