@@ -63,6 +63,9 @@ void run_evaluate(EvaluateArguments a) {
   if (!a.occlusion.empty()) truth.occlusion = read_mask(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = ws::read_map(a.truth_normals);
   if (!a.image.empty()) truth.image = ws::read_grey_levels(a.image);
+  if (!a.normals.empty() && a.truth_normals.empty()) {
+    throw ws::Error("--normals needs --truth-normals, or a folder with them by --set.");
+  }
   if (a.far_distance > 0) {
     if (a.field_of_view.empty()) {
       throw ws::Error("--far-distance needs --field-of-view, or a folder with it by --set.");
@@ -125,13 +128,16 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--truth-normals", a->truth_normals, "Ground truth of the normals");
   command->add_option("--image", a->image,
                       "The view's image: scores textured surfaces, and their interiors, as well");
+  CLI::Option* far_distance =
+      command
+          ->add_option("--far-distance", a->far_distance,
+                       "Also prints how much of what has no ground truth, such as a sky, comes out "
+                       "at this distance (metres) to within 2 px")
+          ->check(positive_number());
   command
-      ->add_option("--far-distance", a->far_distance,
-                   "Also prints how much of what has no ground truth, such as a sky, comes out "
-                   "at this distance (metres) to within 2 px")
-      ->check(positive_number());
-  command->add_option("--field-of-view", a->field_of_view,
-                      "Mask, 0 = outside the lens; for --far-distance");
+      ->add_option("--field-of-view", a->field_of_view,
+                   "Mask, 0 = outside the lens; for --far-distance")
+      ->needs(far_distance);
   command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
   command->add_option("--view", a->view, "Camera of the distance map")->capture_default_str();
   command->add_option("--source", a->source, "Camera in which displacements are measured")

@@ -3,6 +3,8 @@
 
 #include <map>
 
+#include "widestereo/error.h"
+
 using widestereo::DistanceSampling;
 using widestereo::Filter;
 using widestereo::Interpolation;
@@ -49,6 +51,7 @@ void MatchSettings::add_to(CLI::App& command) {
   command
       .add_option("--max-samples-per-dispatch", device.max_samples_per_dispatch,
                   "GPUs: longest dispatch in patch samples, 0 = by device")
+      ->check(CLI::Range(0L, 1'000'000'000'000L))
       ->group(devices);
 
   const std::string matching = "Matching";
@@ -133,6 +136,19 @@ void MatchSettings::add_to(CLI::App& command) {
             "Fill rejected pixels from accepted ones up to this many pixels away; 0 = do not");
 }
 
+void MatchSettings::require_effect(const Options& options) const {
+  if (options.search == widestereo::SearchMethod::random) return;
+  for (const auto& [name, given] :
+       {std::pair("--iterations", first_iterations.has_value()),
+        {"--second-iterations", second_iterations.has_value()},
+        {"--refinements", refinements.has_value()},
+        {"--propagation raster", options.propagation == Propagation::raster}}) {
+    if (!given) continue;
+    throw widestereo::Error(std::string(name) + " has no effect with the preset " + options.preset +
+                            "; leave it out, or choose --preset paper.");
+  }
+}
+
 Options MatchSettings::options() const {
   Options options = Options::preset_named(preset);
   take(options.min_distance, min_distance);
@@ -177,6 +193,7 @@ Options MatchSettings::options() const {
   take(options.fill_radius, fill_radius);
   take(options.consistency_relative, consistency_relative);
   take(options.consistency_pixels, consistency_pixels);
+  require_effect(options);
   validate(options);
   return options;
 }

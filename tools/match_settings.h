@@ -42,4 +42,8 @@ struct MatchSettings {
   void add_to(CLI::App& command);
   /// The preset with the given values in place.
   widestereo::Options options() const;
+
+ private:
+  /// Throws Error where a given option is not one of the preset's search.
+  void require_effect(const widestereo::Options& options) const;
 };

@@ -27,6 +27,7 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
       .add_option("--poses-tolerance", tolerance,
                   "Largest difference of time between image and pose, seconds")
       ->check(non_negative_number())
+      ->needs("--poses")
       ->capture_default_str()
       ->group(group);
 }

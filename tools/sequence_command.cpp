@@ -365,14 +365,19 @@ void add_sequence_command(CLI::App& app) {
   const std::string start = "Warm start";
   a->poses.add_to(*command, "without it the motion is estimated from the images", start);
   command->add_flag("--no-motion", a->no_motion, "Start where the planes were: no motion")
+      ->excludes("--poses")
       ->group(start);
-  command->add_flag("--no-warm-start", a->no_warm_start, "Match every frame by itself")
-      ->group(start);
+  CLI::Option* no_warm_start =
+      command->add_flag("--no-warm-start", a->no_warm_start, "Match every frame by itself")
+          ->excludes("--poses")
+          ->excludes("--no-motion")
+          ->group(start);
   command
       ->add_option("--restart-below", a->restart_below,
                    "Match a frame by itself when less than this share of what the last such frame "
                    "had is accepted; 0 = never")
       ->check(CLI::Range(0.0, 1.0))
+      ->excludes(no_warm_start)
       ->capture_default_str()
       ->group(start);
   command->add_flag("--overwrite", a->overwrite, "Remove the frames of an earlier run first");

@@ -224,6 +224,36 @@ TEST_F(RefusedWords, LimitsAreShort) {
   expect_refusal(sequence() + "--step 0", "--step: 0 is no number above 0");
   expect_refusal(depth_of("left.png", "right.png") + "--png-scale 0",
                  "--png-scale: 0 is no number above 0");
+  for (const char* samples : {"-1", "99999999999999999999"}) {
+    expect_refusal(depth_of("left.png", "right.png") + "--max-samples-per-dispatch " + samples,
+                   "--max-samples-per-dispatch: Value");
+  }
+}
+
+TEST_F(RefusedWords, OptionsHaveAnEffect) {
+  const std::string depth = "depth " + file("left.png") + " " + file("right.png") + " -c " +
+                            file("calib.yaml") + " -o " + file("out") + " --device cpu ";
+  for (const char* option :
+       {"--propagation raster", "--iterations 3", "--second-iterations 3", "--refinements 3"}) {
+    expect_error(depth + option, std::string(option).substr(0, std::string(option).find(' ')));
+    expect_error(depth + "--preset fast " + option, "has no effect with the preset fast");
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  expect_refusal(depth + "--poses-tolerance 0.1", "--poses");
+  expect_refusal(sequence() + "--poses p.txt --no-motion", "excludes");
+  for (const char* option : {"--poses p.txt", "--no-motion", "--restart-below 0.5"}) {
+    expect_refusal(sequence() + "--no-warm-start " + option, "excludes");
+  }
+  cv::imwrite(file("map.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
+  cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
+  const std::string evaluate = "evaluate " + file("map.tiff") + " -c " + file("calib.yaml") +
+                               " --truth " + file("map.tiff") + " ";
+  expect_error(evaluate + "--normals " + file("normals.tiff"), "--truth-normals");
+  expect_refusal(evaluate + "--field-of-view " + file("left.png"), "--far-distance");
+  EXPECT_EQ(run(evaluate + "--normals " + file("normals.tiff") + " --truth-normals " +
+                file("normals.tiff"))
+                .exit_code,
+            0);
 }
 
 TEST_F(Command, UnknownCommandsAreNamed) {
