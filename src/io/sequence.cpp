@@ -73,7 +73,9 @@ Images images_in(const fs::path& folder) {
 
 Images images_listed_in(const fs::path& list) {
   std::ifstream file(list);
+  if (!file) throw Error("Cannot read " + list.string() + "; check its permissions.");
   Images images{.of_frames = {}, .listed = true};
+  std::map<std::string, int> lines;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
@@ -86,23 +88,61 @@ Images images_listed_in(const fs::path& list) {
       throw Error(list.string() + " line " + std::to_string(number) +
                   " is no \"nanoseconds,filename\".");
     }
+    const auto [earlier, is_new] = lines.emplace(time, number);
+    if (!is_new) {
+      throw Error(list.string() + " has the time " + time + " in line " +
+                  std::to_string(earlier->second) + " and in line " + std::to_string(number) +
+                  "; leave one.");
+    }
     images.of_frames.emplace(time, list.parent_path() / "data" / line.substr(start));
   }
   if (images.of_frames.empty()) throw Error(list.string() + " lists no images.");
   return images;
 }
 
+/// What lies at a path, of type not_found if nothing does.
+fs::file_type type_of(const fs::path& path) {
+  std::error_code error;
+  const fs::file_type type = fs::status(path, error).type();
+  if (type == fs::file_type::none) {
+    throw Error("Cannot read " + path.string() + ": " + error.message() +
+                "; check the permissions of its folder.");
+  }
+  return type;
+}
+
+bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::directory; }
+
 /// Images of camN in either layout.
 Images images_of(const fs::path& folder, int camera) {
   const std::string name = "cam" + std::to_string(camera);
   for (const fs::path& base : {folder / "mav0" / name, folder / name}) {
-    if (fs::is_regular_file(base / "data.csv")) return images_listed_in(base / "data.csv");
-    if (fs::is_directory(base / "data")) return images_in(base / "data");
-    if (fs::is_directory(base)) return images_in(base);
+    const fs::path list = base / "data.csv";
+    if (type_of(list) == fs::file_type::regular) return images_listed_in(list);
+    if (is_folder(base / "data")) return images_in(base / "data");
+    if (is_folder(base)) return images_in(base);
   }
   throw Error("There is no folder " + (folder / name).string() +
               "; a data set has images in cam0, cam1, ... or in mav0/cam0/data, mav0/cam1/data, "
               "...");
+}
+
+/// Frames are told apart by name, which is also that of a folder.
+void require_usable_names(const std::vector<SequenceFrame>& frames) {
+  std::map<std::string, fs::path> images;
+  for (const SequenceFrame& frame : frames) {
+    const fs::path& image = frame.images.front();
+    if (frame.name.empty() || frame.name == "." || frame.name == "..") {
+      throw Error("The image " + image.string() +
+                  " gives its frame no usable name; rename it and its like.");
+    }
+    const auto [other, is_new] = images.emplace(frame.name, image);
+    if (!is_new) {
+      throw Error("Two frames have the name " + frame.name + ", those of " +
+                  other->second.string() + " and " + image.string() +
+                  "; give the images names that differ before the extension.");
+    }
+  }
 }
 
 /// Of digits alone.
@@ -143,7 +183,7 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
 
 std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
                                          bool skip_incomplete) {
-  if (!fs::is_directory(folder)) {
+  if (!is_folder(folder)) {
     throw Error("There is no folder " + folder.string() + "; check the path.");
   }
   std::vector<Images> images;
@@ -177,6 +217,7 @@ std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vect
     throw Error("No frame of " + folder.string() +
                 " has images of all cameras; images of one frame must have equal names or times.");
   }
+  require_usable_names(frames);
   return frames;
 }
 

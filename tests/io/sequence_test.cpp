@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <iomanip>
 #include <opencv2/core.hpp>
@@ -113,6 +114,29 @@ TEST_F(Sequences, WhatIsMissingIsNamed) {
   EXPECT_THAT(error({2}), HasSubstr("line 2"));
   add("mav0/cam2/data.csv", "");
   EXPECT_THAT(error({2}), HasSubstr("lists no images"));
+}
+
+TEST_F(Sequences, FramesOfOneNameAreRefused) {
+  add("mav0/cam0/data.csv", "200,000001.png\n300,000001.png\n");
+  EXPECT_THAT(error({0}), HasSubstr("Two frames have the name 000001, those of "));
+  add("mav0/cam0/data.csv", "1000,a/1.png\n2000,b/1.png\n");
+  EXPECT_THAT(error({0}), HasSubstr("mav0/cam0/data/b/1.png; give the images names that differ"));
+  add("mav0/cam0/data.csv", "#\n1000,a.png\n1000,b.png\n");
+  EXPECT_THAT(error({0}), HasSubstr("data.csv has the time 1000 in line 2 and in line 3"));
+  for (const char* name : {"..png", "...png"}) {
+    add("cam1/" + std::string(name));
+    EXPECT_THAT(error({1}), HasSubstr(std::string("cam1/") + name + " gives its frame no usable"));
+    fs::remove(folder_ / "cam1" / name);
+  }
+}
+
+TEST_F(Sequences, UnreadableFoldersAreNamed) {
+  if (geteuid() == 0) GTEST_SKIP() << "permissions do not hold for root";
+  add("mav0/cam0/data/1.png");
+  fs::permissions(folder_ / "mav0/cam0", fs::perms::none);
+  const std::string message = error({0});
+  fs::permissions(folder_ / "mav0/cam0", fs::perms::owner_all);
+  EXPECT_THAT(message, HasSubstr("mav0/cam0/data.csv: Permission denied; check the permissions"));
 }
 
 class Trajectories : public Sequences {
