@@ -88,6 +88,10 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
     if (!masks.empty()) {
       const std::string& file = masks[masks.size() == 1 ? 0 : i];
       view.mask = ws::to_intensity(ws::read_image(file), file) > 0;
+      if (cv::countNonZero(view.mask) == 0) {
+        throw ws::Error("The mask " + file +
+                        " is 0 everywhere, so that no pixel is left; 0 means to ignore the pixel.");
+      }
     }
   }
 }

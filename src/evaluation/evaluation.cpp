@@ -37,12 +37,25 @@ struct Sample {
   cv::Point pixel;
 };
 
+std::string text_of(int type) {
+  const int channels = CV_MAT_CN(type);
+  const int depth = CV_MAT_DEPTH(type);
+  const std::string number = depth == CV_32F  ? "32-bit float"
+                             : depth == CV_8U ? "8-bit whole number"
+                                              : "number of another type";
+  return std::to_string(channels) + " " + number + (channels == 1 ? "" : "s");
+}
+
 void require_size(const cv::Mat& map, cv::Size size, int type, const char* what) {
-  if (map.empty() || (map.size() == size && map.type() == type)) return;
+  if (map.empty()) return;
+  if (map.type() != type) {
+    throw Error(std::string("The ") + what + " has " + text_of(map.type()) +
+                " a pixel instead of " + text_of(type) + "; give another map.");
+  }
+  if (map.size() == size) return;
   throw Error(std::string("The ") + what + " is " + std::to_string(map.cols) + "x" +
-              std::to_string(map.rows) + " or of another type, but the distance map is " +
-              std::to_string(size.width) + "x" + std::to_string(size.height) +
-              "; give maps of the same view.");
+              std::to_string(map.rows) + ", but the distance map is " + std::to_string(size.width) +
+              "x" + std::to_string(size.height) + "; give maps of the same view.");
 }
 
 double angle_between(const cv::Vec3f& a, const cv::Vec3f& b) {

@@ -274,11 +274,14 @@ TEST_F(Command, RefusedRequestsLeaveNoFolder) {
   const std::string depth = "depth " + file("left.png") + " " + file("right.png") + " -c " +
                             file("calib.yaml") + " -o " + file("out") + " ";
   cv::imwrite(file("one.png"), cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)));
+  cv::imwrite(file("none.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
   expect_error(depth + "--device cpu --levels 4", "level iterations");
   expect_error(depth + "--device cpux", "cpux");
   expect_error("depth " + file("one.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
                    " -o " + file("out") + " --device cpu",
                file("one.png") + " is 1x1 pixels");
+  expect_error(depth + "--device cpu --mask " + file("none.png"),
+               "The mask " + file("none.png") + " is 0 everywhere");
   expect_error("demo --size 64 --device cpu --levels 4 -o " + file("out"), "level iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
@@ -339,6 +342,10 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   EXPECT_EQ(scores[0]["bad_relative"]["0.01"], 1.0);
   EXPECT_EQ(scores[0]["bad_relative"]["0.02"], 0.0);
   EXPECT_TRUE(fs::exists(file("error.png")));
+  cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
+  expect_error("evaluate " + file("prediction.tiff") + " -c " + file("calib.yaml") + " --truth " +
+                   file("normals.tiff"),
+               "The ground truth has 3 32-bit floats a pixel instead of 1 32-bit float;");
   cv::imwrite(file("confidence.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
   const Outcome curve = run("evaluate " + file("prediction.tiff") + common +
                             " --json --confidence " + file("confidence.tiff"));
