@@ -27,8 +27,8 @@ namespace {
 
 /// JSON has neither NaN nor infinity.
 std::string text(double number) {
-  if (std::isnan(number)) return "not a number (NaN)";
-  if (std::isinf(number)) return number > 0 ? "infinite" : "minus infinity";
+  if (std::isnan(number)) return "NaN (not a number)";
+  if (std::isinf(number)) return number > 0 ? "infinity" : "minus infinity";
   return nlohmann::json(number).dump();
 }
 
