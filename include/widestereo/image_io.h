@@ -3,15 +3,18 @@
 
 #include <filesystem>
 #include <functional>
+#include <iosfwd>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
 namespace widestereo {
 
-/// Writes a file atomically: `write` fills a temporary file beside `path` (same extension), which
-/// is renamed to `path` when it returns and removed when it throws. Throws Error naming `path`.
-void write_atomically(const std::filesystem::path& path,
-                      const std::function<void(const std::filesystem::path& temporary)>& write);
+/// Writes a file: `write` fills a stream whose every byte is checked. What lies at `path` is
+/// replaced at once when all is written and left as it was when anything fails; symbolic links stay
+/// and the file that they lead to is replaced. Devices, FIFOs and /dev/stdout are written directly.
+/// Throws Error naming `path`, the cause and the remedy.
+void write_file(const std::filesystem::path& path,
+                const std::function<void(std::ostream& stream)>& write);
 
 /// Creates the folder (and parents) if needed and checks that files can be made in it.
 void prepare_output_folder(const std::filesystem::path& folder);
@@ -19,8 +22,8 @@ void prepare_output_folder(const std::filesystem::path& folder);
 /// Throws Error where a file cannot be written, for those that are written after long work.
 void require_writable(const std::filesystem::path& file);
 
-/// Reads an 8- or 16-bit image, grey or BGR, depth kept. Throws Error (missing, truncated, no
-/// image).
+/// Reads an 8- or 16-bit image, grey or BGR, depth kept. Throws Error (missing, truncated, damaged,
+/// no image).
 cv::Mat read_image(const std::filesystem::path& path);
 
 /// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA

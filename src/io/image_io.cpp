@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <ostream>
 #include <system_error>
 
 #include "io/pfm.h"
@@ -77,18 +78,22 @@ cv::Mat decode(const fs::path& path) {
   return image;
 }
 
+/// In memory: OpenCV's own writing of files does not notice a full disk.
 void encode(const fs::path& path, const cv::Mat& image, const std::vector<int>& parameters = {}) {
-  write_atomically(path, [&](const fs::path& temporary) {
-    bool written = false;
-    try {
-      written = cv::imwrite(temporary.string(), image, parameters);
-    } catch (const cv::Exception&) {
-      written = false;
-    }
-    if (!written) {
-      throw Error("Cannot write " + path.string() +
-                  "; check the extension, the folder's permissions and free space.");
-    }
+  std::vector<uchar> bytes;
+  bool encoded = false;
+  try {
+    encoded = cv::imencode(path.extension().string(), image, bytes, parameters);
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw;
+  }
+  if (!encoded) {
+    throw Error("Cannot write " + path.string() +
+                ": its extension names no format that holds such an image; use .png.");
+  }
+  write_file(path, [&](std::ostream& stream) {
+    stream.write(reinterpret_cast<const char*>(bytes.data()),
+                 static_cast<std::streamsize>(bytes.size()));
   });
 }
 
@@ -190,7 +195,7 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
   }
   const std::string extension = extension_of(path);
   if (extension == ".pfm") {
-    write_atomically(path, [&](const fs::path& temporary) { write_pfm(temporary, map); });
+    write_file(path, [&](std::ostream& stream) { write_pfm(stream, map); });
   } else if (extension == ".tif" || extension == ".tiff") {
     // By default OpenCV compresses three float channels with loss (LogLuv).
     constexpr int no_compression = 1;

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <opencv2/core.hpp>
 
 #include "text/number.h"
@@ -66,16 +65,12 @@ cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& by
   return map;
 }
 
-void write_pfm(const std::filesystem::path& path, const cv::Mat& map) {
-  std::ofstream file(path, std::ios::binary);
-  file << (map.channels() == 3 ? "PF" : "Pf") << "\n"
-       << text_of(map.cols) << " " << text_of(map.rows) << "\n-1.0\n";
+void write_pfm(std::ostream& stream, const cv::Mat& map) {
+  stream << (map.channels() == 3 ? "PF" : "Pf") << "\n"
+         << text_of(map.cols) << " " << text_of(map.rows) << "\n-1.0\n";
   const auto row_bytes = static_cast<std::streamsize>(map.cols * map.elemSize());
   for (int y = map.rows - 1; y >= 0; --y) {
-    file.write(reinterpret_cast<const char*>(map.ptr(y)), row_bytes);
-  }
-  if (!file.flush()) {
-    throw Error("Cannot write " + path.string() + "; check permissions and free space.");
+    stream.write(reinterpret_cast<const char*>(map.ptr(y)), row_bytes);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <iosfwd>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -11,6 +12,6 @@ namespace widestereo {
 cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& bytes);
 
 /// Writes CV_32FC1 or CV_32FC3 as a little-endian portable float map.
-void write_pfm(const std::filesystem::path& path, const cv::Mat& map);
+void write_pfm(std::ostream& stream, const cv::Mat& map);
 
 }  // namespace widestereo

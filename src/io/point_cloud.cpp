@@ -2,8 +2,8 @@
 #include "widestereo/point_cloud.h"
 
 #include <bit>
-#include <fstream>
 #include <opencv2/core.hpp>
+#include <ostream>
 
 #include "geometry/distance.h"
 #include "io/bgr8.h"
@@ -74,19 +74,15 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
     append(bytes, point.blue);
     append(bytes, point.confidence);
   }
-  write_atomically(path, [&](const std::filesystem::path& temporary) {
-    std::ofstream file(temporary, std::ios::binary);
-    file << "ply\nformat binary_little_endian 1.0\n"
-         << "comment world frame and unit of the calibration\n"
-         << "element vertex " << text_of(cloud.size()) << "\n"
-         << "property float x\nproperty float y\nproperty float z\n"
-         << "property float nx\nproperty float ny\nproperty float nz\n"
-         << "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-         << "property float confidence\nend_header\n";
-    file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    if (!file.flush()) {
-      throw Error("Cannot write " + path.string() + "; check permissions and free space.");
-    }
+  write_file(path, [&](std::ostream& stream) {
+    stream << "ply\nformat binary_little_endian 1.0\n"
+           << "comment world frame and unit of the calibration\n"
+           << "element vertex " << text_of(cloud.size()) << "\n"
+           << "property float x\nproperty float y\nproperty float z\n"
+           << "property float nx\nproperty float ny\nproperty float nz\n"
+           << "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+           << "property float confidence\nend_header\n";
+    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   });
 }
 

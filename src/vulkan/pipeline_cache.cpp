@@ -86,11 +86,9 @@ void PipelineCache::save() {
   FileHeader header;
   header.bytes = current.size();
   header.checksum = checksum(current.data(), current.size());
-  write_atomically(path_, [&](const std::filesystem::path& temporary) {
-    std::ofstream file(temporary, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(&header), sizeof header);
-    file.write(current.data(), static_cast<std::streamsize>(current.size()));
-    if (!file.flush()) throw Error("Cannot write " + path_.string() + "; is the disk full?");
+  write_file(path_, [&](std::ostream& stream) {
+    stream.write(reinterpret_cast<const char*>(&header), sizeof header);
+    stream.write(current.data(), static_cast<std::streamsize>(current.size()));
   });
   saved_ = std::move(current);
 }

@@ -1,10 +1,18 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/image_io.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <cmath>
+#include <csignal>
 #include <cstring>
+#include <functional>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -12,6 +20,7 @@
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
+#include "widestereo/point_cloud.h"
 
 namespace widestereo {
 namespace {
@@ -188,17 +197,132 @@ TEST(BadFiles, PfmHeadersAreChecked) {
   }
 }
 
+/// Stands for a full disk: files cannot grow beyond `bytes`.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = SIG_DFL;
+};
+
+TEST(Writing, NoticesAFullDisk) {
+  const TemporaryFolder folder;
+  cv::Mat image(64, 64, CV_8UC3);
+  cv::randu(image, 0, 255);
+  const std::string text(5000, 'x');
+  const PointCloud cloud(1000);
+  const std::map<std::string, std::function<void(const std::filesystem::path&)>> writers = {
+      {"i.png", [&](const auto& path) { write_image(path, image); }},
+      {"i.jpg", [&](const auto& path) { write_image(path, image); }},
+      {"i.bmp", [&](const auto& path) { write_image(path, image); }},
+      {"m.tiff", [&](const auto& path) { write_map(path, random_map(CV_32FC3)); }},
+      {"m.pfm", [&](const auto& path) { write_map(path, random_map(CV_32FC3)); }},
+      {"m.png", [&](const auto& path) { write_map(path, random_map(CV_32FC1)); }},
+      {"t.txt", [&](const auto& path) { write_text(path, text); }},
+      {"c.ply", [&](const auto& path) { write_ply(path, cloud); }}};
+  for (const auto& [name, write] : writers) {
+    // All but the last byte fits: what is written as files are closed is checked, too.
+    write(folder / name);
+    const std::uintmax_t size = std::filesystem::file_size(folder / name);
+    std::filesystem::remove(folder / name);
+    for (const std::uintmax_t limit : {std::uintmax_t{0}, size / 2, size - 1}) {
+      testing::internal::CaptureStderr();
+      std::string error;
+      {
+        const FileSizeLimit full(limit);
+        error = error_of([&, &write = write, &name = name] { write(folder / name); });
+      }
+      EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << name;
+      EXPECT_NE(error.find(name), std::string::npos) << name << ": " << error;
+      EXPECT_NE(error.find("File too large; make room"), std::string::npos)
+          << name << ": " << error;
+      EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << name << " " << limit;
+    }
+  }
+}
+
+TEST(Writing, FollowsSymbolicLinks) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "elsewhere");
+  folder.write("elsewhere/target.txt", "old");
+  std::filesystem::create_symlink("elsewhere/target.txt", folder / "link.txt");
+  std::filesystem::create_symlink(folder / "link.txt", folder / "second.txt");
+  write_text(folder / "second.txt", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "second.txt"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.txt"));
+  EXPECT_EQ(bytes_of(folder / "elsewhere/target.txt"), "new");
+  std::filesystem::create_symlink("elsewhere/none_yet.txt", folder / "dangling.txt");
+  write_text(folder / "dangling.txt", "first");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "dangling.txt"));
+  EXPECT_EQ(bytes_of(folder / "elsewhere/none_yet.txt"), "first");
+  std::filesystem::create_symlink("loop.txt", folder / "loop.txt");
+  EXPECT_NE(error_of([&] { write_text(folder / "loop.txt", "x"); }).find("loop.txt"),
+            std::string::npos);
+  std::filesystem::create_symlink("none/file.txt", folder / "lost.txt");
+  EXPECT_NE(error_of([&] { write_text(folder / "lost.txt", "x"); }).find("create it"),
+            std::string::npos);
+}
+
+TEST(Writing, LeavesDevicesAndFifosWhatTheyAre) {
+  const TemporaryFolder folder;
+  const std::filesystem::path fifo = folder / "fifo.png";
+  ASSERT_EQ(mkfifo(fifo.c_str(), 0600), 0);
+  const int reader = open(fifo.c_str(), O_RDONLY | O_NONBLOCK);
+  const cv::Mat image(3, 3, CV_8UC1, cv::Scalar(7));
+  write_image(fifo, image);
+  std::array<char, 4096> received{};
+  EXPECT_GT(read(reader, received.data(), received.size()), 60);
+  EXPECT_EQ(std::string(received.data() + 1, 3), "PNG");
+  ASSERT_TRUE(std::filesystem::is_fifo(fifo)) << "nothing of /dev is tried then";
+  // Through links of /proc, as /dev/stdout is one, open files go on where they are.
+  const std::filesystem::path log = folder.write("log.txt", "before ");
+  const int open_file = open(log.c_str(), O_WRONLY | O_APPEND);
+  write_text("/proc/self/fd/" + std::to_string(open_file), "after");
+  close(open_file);
+  close(reader);
+  EXPECT_EQ(bytes_of(log), "before after");
+  write_text("/dev/null", "x");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_NE(error_of([&] { write_text("/dev/full", "x"); }).find("No space left on device"),
+            std::string::npos);
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+  EXPECT_NE(error_of([&] { write_text(folder.path(), "x"); }).find("is a folder"),
+            std::string::npos);
+}
+
+TEST(Writing, TakesTheLongestNames) {
+  const TemporaryFolder folder;
+  const std::string longest = std::string(251, 'n') + ".png";
+  write_image(folder / longest, cv::Mat(3, 3, CV_8UC1, cv::Scalar(7)));
+  EXPECT_FALSE(read_image(folder / longest).empty());
+  const std::string error = error_of([&] { write_text(folder / ("n" + longest), "x"); });
+  EXPECT_NE(error.find("File name too long"), std::string::npos) << error;
+}
+
 TEST(Writing, LeavesNothingBehindWhenItFails) {
   const TemporaryFolder folder;
-  EXPECT_THROW(write_atomically(folder / "a.txt",
-                                [](const std::filesystem::path& temporary) {
-                                  std::ofstream(temporary) << "half";
-                                  throw Error("disk full");
-                                }),
+  EXPECT_THROW(write_file(folder / "a.txt",
+                          [](std::ostream& stream) {
+                            stream << "half" << std::flush;
+                            throw Error("disk full");
+                          }),
                Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   write_text(folder / "b.txt", "old");
-  EXPECT_THROW(write_atomically(folder / "b.txt", [](const auto&) { throw Error("no"); }), Error);
+  EXPECT_THROW(write_file(folder / "b.txt", [](std::ostream&) { throw Error("no"); }), Error);
   EXPECT_EQ(bytes_of(folder / "b.txt"), "old");
   write_text(folder / "b.txt", "new");
   EXPECT_EQ(bytes_of(folder / "b.txt"), "new");
