@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/image_io.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <ostream>
+#include <span>
 #include <system_error>
 
 #include "io/pfm.h"
@@ -40,34 +43,85 @@ std::vector<uchar> read_bytes(const fs::path& path) {
   return bytes;
 }
 
-bool ends_with(const std::vector<uchar>& bytes, const std::vector<uchar>& tail) {
-  return bytes.size() >= tail.size() && std::equal(tail.rbegin(), tail.rend(), bytes.rbegin());
+bool begins_with(std::span<const uchar> bytes, std::initializer_list<uchar> head) {
+  return bytes.size() >= head.size() && std::equal(head.begin(), head.end(), bytes.begin());
 }
 
-/// Decoders fill the missing part of a truncated PNG or JPEG silently, so look for the end marker.
-bool is_truncated(const std::vector<uchar>& bytes) {
-  const auto begins_with = [&](std::initializer_list<uchar> head) {
-    return bytes.size() >= head.size() && std::equal(head.begin(), head.end(), bytes.begin());
-  };
-  if (begins_with({0x89, 'P', 'N', 'G'})) {
-    return !ends_with(bytes, {'I', 'E', 'N', 'D', 0xae, 0x42, 0x60, 0x82});
+/// Big-endian, of 2 or 4 bytes.
+std::size_t number_at(std::span<const uchar> bytes, std::size_t position, std::size_t size) {
+  std::size_t number = 0;
+  for (const uchar byte : bytes.subspan(position, size)) number = number << 8 | byte;
+  return number;
+}
+
+/// CRC-32 of ISO 3309, as PNG has it.
+std::uint32_t crc32(std::span<const uchar> bytes) {
+  static const auto table = [] {
+    std::array<std::uint32_t, 256> remainders{};
+    for (std::uint32_t i = 0; i < remainders.size(); ++i) {
+      remainders[i] = i;
+      for (int bit = 0; bit < 8; ++bit) {
+        remainders[i] = remainders[i] >> 1 ^ (remainders[i] & 1 ? 0xedb88320u : 0u);
+      }
+    }
+    return remainders;
+  }();
+  std::uint32_t crc = ~0u;
+  for (const uchar byte : bytes) crc = table[(crc ^ byte) & 0xff] ^ crc >> 8;
+  return ~crc;
+}
+
+/// Whether all chunks are there up to the last one, those that matter undamaged.
+bool is_whole_png(std::span<const uchar> bytes) {
+  constexpr std::size_t signature = 8, around_data = 12;  // length, type and CRC of a chunk
+  for (std::size_t at = signature; at + around_data <= bytes.size();) {
+    const std::size_t length = number_at(bytes, at, 4);
+    if (length > bytes.size() - at - around_data) return false;
+    const auto type_and_data = bytes.subspan(at + 4, length + 4);
+    const bool is_critical = type_and_data[0] >= 'A' && type_and_data[0] <= 'Z';
+    if (is_critical && crc32(type_and_data) != number_at(bytes, at + 8 + length, 4)) return false;
+    if (begins_with(type_and_data, {'I', 'E', 'N', 'D'})) return true;
+    at += around_data + length;
   }
-  if (begins_with({0xff, 0xd8, 0xff})) {
-    // Cameras may append data; the marker must merely be there.
-    const std::array<uchar, 2> end = {0xff, 0xd9};
-    return std::search(bytes.begin(), bytes.end(), end.begin(), end.end()) == bytes.end();
+  return false;
+}
+
+/// Whether the image's own end is there; a preview within a segment has one, too.
+bool is_whole_jpeg(std::span<const uchar> bytes) {
+  constexpr uchar stuffing = 0, first_restart = 0xd0, start = 0xd8, end = 0xd9, fill = 0xff;
+  for (std::size_t at = 2; at + 1 < bytes.size();) {
+    const uchar marker = bytes[at + 1];
+    if (bytes[at] != 0xff || marker == fill) {
+      ++at;  // of compressed data, or before a marker
+    } else if (marker == stuffing || (marker >= first_restart && marker <= start)) {
+      at += 2;
+    } else if (marker == end) {
+      return true;
+    } else {
+      if (at + 4 > bytes.size()) return false;
+      at += 2 + number_at(bytes, at + 2, 2);
+    }
   }
+  return false;
+}
+
+/// Decoders fill the missing part of a truncated PNG or JPEG silently. What follows the end is none
+/// of it: cameras append data.
+bool is_truncated(std::span<const uchar> bytes) {
+  if (begins_with(bytes, {0x89, 'P', 'N', 'G'})) return !is_whole_png(bytes);
+  if (begins_with(bytes, {0xff, 0xd8, 0xff})) return !is_whole_jpeg(bytes);
   return false;
 }
 
 cv::Mat decode(const fs::path& path) {
   const std::vector<uchar> bytes = read_bytes(path);
   if (bytes.empty()) throw Error(path.string() + " is empty; give an image file.");
-  if (is_truncated(bytes)) throw Error(path.string() + " is truncated; copy it again.");
+  if (is_truncated(bytes)) throw Error(path.string() + " is truncated or damaged; copy it again.");
   cv::Mat image;
   try {
     image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw;
     image.release();
   }
   if (image.empty()) {

@@ -197,6 +197,50 @@ TEST(BadFiles, PfmHeadersAreChecked) {
   }
 }
 
+TEST(BadFiles, PreviewsEndsAreNotTheImages) {
+  const TemporaryFolder folder;
+  cv::Mat image(40, 50, CV_8UC3);
+  cv::randu(image, 0, 255);
+  write_image(folder / "i.jpg", image);
+  const std::string jpeg = bytes_of(folder / "i.jpg");
+  const std::string preview = "preview \xff\xd9 preview";
+  const auto length = static_cast<char>(2 + preview.size());
+  const std::string whole =
+      jpeg.substr(0, 2) + "\xff\xe1" + '\0' + length + preview + jpeg.substr(2);
+  EXPECT_NO_THROW(read_image(folder.write("whole.jpg", whole)));
+  EXPECT_THROW(read_image(folder.write("half.jpg", whole.substr(0, whole.size() / 2))), Error);
+  EXPECT_THROW(read_image(folder.write("preview.jpg", whole.substr(0, 40))), Error);
+}
+
+TEST(BadFiles, WhatFollowsAnImageIsIgnored) {
+  const TemporaryFolder folder;
+  const cv::Mat image(9, 7, CV_8UC3, cv::Scalar(10, 20, 30));
+  for (const char* name : {"i.png", "i.jpg"}) {
+    write_image(folder / name, image);
+    const std::string whole = bytes_of(folder / name);
+    for (const std::string& more : {std::string(5000, '\0'), std::string("more"), whole}) {
+      EXPECT_NO_THROW(EXPECT_EQ(read_image(folder.write(name, whole + more)).size(), image.size()))
+          << name;
+    }
+  }
+}
+
+TEST(BadFiles, DamagedChunksOfPngAreNoticed) {
+  const TemporaryFolder folder;
+  cv::Mat image(20, 30, CV_8UC1);
+  cv::randu(image, 0, 255);
+  write_image(folder / "i.png", image);
+  const std::string whole = bytes_of(folder / "i.png");
+  for (std::size_t at = 16; at < whole.size(); at += 7) {
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 4);
+    testing::internal::CaptureStderr();
+    const std::string error = error_of([&] { read_image(folder.write("d.png", damaged)); });
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << at;
+    EXPECT_NE(error.find("damaged"), std::string::npos) << at << " " << error;
+  }
+}
+
 /// Stands for a full disk: files cannot grow beyond `bytes`.
 class FileSizeLimit {
  public:
