@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
 
 #include "commands.h"
 #include "option_checks.h"
@@ -29,9 +32,12 @@ std::string unknown_command(const CLI::App& app) {
   return app.remaining().front() + " is no command; `widestereo" + path + " --help` lists them.";
 }
 
-}  // namespace
+int report_lack_of_memory() {
+  std::cerr << "widestereo: Not enough memory; use smaller images.\n";
+  return 1;
+}
 
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app{
       "widestereo: dense stereo directly on ultra-wide-angle (fisheye) images, without "
       "rectification"};
@@ -61,7 +67,10 @@ int main(int argc, char** argv) {
     std::cerr << "widestereo: " << error.what() << "\n";
     return 1;
   } catch (const std::bad_alloc&) {
-    std::cerr << "widestereo: Not enough memory; use smaller images.\n";
+    return report_lack_of_memory();
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) return report_lack_of_memory();
+    std::cerr << "widestereo: Internal error: " << error.what() << "\n";
     return 1;
   } catch (const std::filesystem::filesystem_error& error) {
     std::cerr << "widestereo: Cannot use " << error.path1().string() << ": "
@@ -72,4 +81,22 @@ int main(int argc, char** argv) {
     return 1;
   }
   return 0;
+}
+
+/// What was printed is kept back until it is a block: a full disk may show only here.
+bool flush_standard_output() {
+  std::cout.flush();
+  return std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // What OpenCV logs of broken images, the command says in a sentence.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  const int exit_code = run(argc, argv);
+  if (flush_standard_output() || exit_code != 0) return exit_code;
+  std::cerr << "widestereo: Cannot write to standard output; make room where it goes, or write "
+               "elsewhere.\n";
+  return 1;
 }

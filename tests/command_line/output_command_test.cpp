@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// What the command writes, where it cannot, and what an earlier run has left.
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+
+#include "command_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+class Output : public Command {
+ protected:
+  std::string content(const std::string& name) const {
+    std::ifstream stream(folder_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  std::set<std::string> files_in(const std::string& folder) const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder_ / folder)) {
+      names.insert(entry.path().filename().string());
+    }
+    return names;
+  }
+  /// Calibration of two pinhole cameras of this size.
+  void write_small_calibration(int width, int height) const {
+    std::string text;
+    for (const char* camera : {"cam0", "cam1"}) {
+      text += std::string(camera) + ":\n";
+      if (text.size() > 10) {
+        text += "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+      }
+      const std::string size = std::to_string(width) + ", " + std::to_string(height);
+      text += "  camera_model: pinhole\n  intrinsics: [9, 9, " + std::to_string(width / 2) + ", " +
+              std::to_string(height / 2) +
+              "]\n  distortion_model: none\n  distortion_coeffs: []\n  resolution: [" + size +
+              "]\n";
+    }
+    folder_.write("small.yaml", text);
+  }
+};
+
+/// A limit of the size of files stands for a full disk.
+TEST_F(Output, FullDiskIsNoticed) {
+  cv::imwrite(file("truth.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
+  const std::string full = "trap '' XFSZ; ulimit -f 1;";
+  const Outcome map = run("evaluate " + file("truth.tiff") + " -c " + file("calib.yaml") +
+                              " --truth " + file("truth.tiff") + " --valid " + file("left.png") +
+                              " --error-map " + file("map.png"),
+                          full);
+  EXPECT_EQ(map.exit_code, 1) << map.output;
+  EXPECT_FALSE(fs::exists(file("map.png")));
+  for (const char* blocks : {"1", "20", "80", "400"}) {
+    const Outcome outcome = run(depth_of("left.png", "right.png"),
+                                std::string("trap '' XFSZ; ulimit -f ") + blocks + ";");
+    EXPECT_EQ(outcome.exit_code, blocks == std::string("400") ? 0 : 1) << blocks << outcome.output;
+    EXPECT_EQ(fs::exists(file("out/result.json")), outcome.exit_code == 0) << blocks;
+    if (outcome.exit_code == 0) continue;
+    EXPECT_NE(outcome.output.find("File too large; make room"), std::string::npos)
+        << outcome.output;
+    EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
+  }
+}
+
+TEST_F(Output, LostStandardOutputIsAnError) {
+  for (const std::string& arguments :
+       {"calibration show " + file("calib.yaml") + " --json",
+        "calibration show " + file("calib.yaml"), std::string("--help")}) {
+    const Outcome outcome = run(arguments + " > /dev/full 2> " + file("errors.txt") + "; exit $?");
+    EXPECT_EQ(outcome.exit_code, 1) << arguments;
+    const std::string errors = content("errors.txt");
+    EXPECT_NE(errors.find("widestereo: Cannot write to standard output"), std::string::npos)
+        << errors;
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
+  }
+}
+
+TEST_F(Output, GoesThroughLinksAndFifos) {
+  const std::string convert = "calibration convert " + file("calib.yaml") + " ";
+  fs::create_symlink("/proc/self/fd/1", folder_ / "stdout");  // as /dev/stdout, which is at stake
+  Outcome outcome = run(convert + file("stdout") + " --to basalt");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("\"value0\""), std::string::npos) << outcome.output;
+  folder_.write("target.json", "old");
+  fs::create_symlink("target.json", folder_ / "link.json");
+  outcome = run(convert + file("link.json") + " --to basalt");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link.json"));
+  EXPECT_NE(content("target.json").find("\"value0\""), std::string::npos);
+  ASSERT_EQ(mkfifo(file("fifo").c_str(), 0600), 0);
+  const int reader = open(file("fifo").c_str(), O_RDONLY | O_NONBLOCK);
+  outcome = run(convert + file("fifo") + " --to basalt");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  char first = 0;
+  EXPECT_EQ(read(reader, &first, 1), 1);
+  EXPECT_EQ(first, '{');
+  close(reader);
+}
+
+#ifndef __SANITIZE_ADDRESS__  // which needs more memory than this to begin with
+TEST_F(Output, LackOfMemoryIsNamed) {
+  cv::imwrite(file("big.png"), cv::Mat(12000, 12000, CV_8UC1, cv::Scalar(0)));
+  const std::string big = file("big.png") + " ";
+  const Outcome outcome =
+      run("view-synthesis " + big + big + big + "-c " + file("calib.yaml"), "ulimit -v 600000;");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.output, "widestereo: Not enough memory; use smaller images.\n");
+}
+#endif
+
+}  // namespace
+}  // namespace widestereo::test
