@@ -34,7 +34,8 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
 cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
                       cv::Size size);
 
-/// A picture with a legend below: the colour bar of distance_picture() with distances in `unit`.
+/// A picture with a legend below, 64 pixels wide or more: the colour bar of distance_picture() with
+/// distances in `unit`.
 cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range,
                              const std::string& unit = " m");
 /// ... the colour bar of scalar_picture() with its end values.
@@ -46,8 +47,8 @@ struct Panel {
   std::string title;
   cv::Mat picture;  ///< 8 or 16 bit, grey or colour
 };
-/// Panels side by side, `columns` in a row, each scaled to the width of the first and titled.
-/// Throws Error where there are none or no columns.
+/// Panels side by side, `columns` in a row, each scaled to the width of the first (64 pixels or
+/// more) and titled. Throws Error where there are none or no columns.
 cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns);
 
 }  // namespace widestereo

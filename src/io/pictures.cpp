@@ -50,10 +50,14 @@ cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {
 
 double text_scale(const cv::Mat& picture) { return std::max(0.35, picture.cols / 900.0); }
 
-/// The picture above an empty strip for a legend.
+/// What legends and titles need.
+constexpr int least_width = 64;
+
+/// The picture above an empty strip for a legend, and beside one if it is too narrow.
 cv::Mat with_strip(const cv::Mat& picture, int height) {
   cv::Mat result;
-  cv::copyMakeBorder(picture, result, 0, height, 0, 0, cv::BORDER_CONSTANT, paper_colour);
+  cv::copyMakeBorder(picture, result, 0, height, 0, std::max(0, least_width - picture.cols),
+                     cv::BORDER_CONSTANT, paper_colour);
   return result;
 }
 
@@ -81,7 +85,7 @@ cv::Mat with_bar(const cv::Mat& picture, int map,
   const int line = static_cast<int>(30 * scale);
   const int margin = line / 2;
   cv::Mat result = with_strip(picture, 3 * line);
-  const cv::Rect bar(margin, picture.rows + line / 2, picture.cols - 2 * margin, line);
+  const cv::Rect bar(margin, picture.rows + line / 2, result.cols - 2 * margin, line);
   cv::Mat ramp(1, bar.width, CV_32F);
   for (int x = 0; x < bar.width; ++x) {
     ramp.at<float>(0, x) = static_cast<float>(x) / static_cast<float>(bar.width - 1);
@@ -202,7 +206,7 @@ cv::Mat with_reason_legend(const cv::Mat& picture) {
   const int count = static_cast<int>(reason_styles.size());
   const int rows = (count + 3) / 4;
   cv::Mat result = with_strip(picture, (2 + 5 * rows) * line / 4);
-  const int column = picture.cols / 4;
+  const int column = result.cols / 4;
   for (int i = 0; i < count; ++i) {
     const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
     const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
@@ -217,17 +221,17 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
     throw Error("A sheet of " + std::to_string(panels.size()) + " panels in " +
                 std::to_string(columns) + " columns is empty; give one or more of both.");
   }
-  const int width = panels.front().picture.cols;
+  const int width = std::max(panels.front().picture.cols, least_width);
   const double scale = std::max(0.45, width / 700.0);
   const int title = static_cast<int>(36 * scale);
   const int gap = title / 3;
   std::vector<cv::Mat> pictures;
   int height = 0;
   for (const Panel& panel : panels) {
-    cv::Mat picture = to_bgr8(panel.picture);
+    cv::Mat picture = with_strip(to_bgr8(panel.picture), 0);
     const double factor = static_cast<double>(width) / picture.cols;
-    cv::resize(picture, picture, {width, static_cast<int>(picture.rows * factor)}, 0, 0,
-               factor < 1 ? cv::INTER_AREA : cv::INTER_NEAREST);
+    cv::resize(picture, picture, {width, std::max(1, static_cast<int>(picture.rows * factor))}, 0,
+               0, factor < 1 ? cv::INTER_AREA : cv::INTER_NEAREST);
     height = std::max(height, picture.rows);
     pictures.push_back(picture);
   }

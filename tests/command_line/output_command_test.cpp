@@ -113,5 +113,18 @@ TEST_F(Output, LackOfMemoryIsNamed) {
 }
 #endif
 
+TEST_F(Output, PicturesAreOfAnySize) {
+  for (const cv::Size size : {cv::Size(8, 8), {9, 17}, {4, 64}, {64, 2}, {10, 10}}) {
+    cv::Mat image(size, CV_8UC1);
+    cv::randu(image, 0, 255);
+    cv::imwrite(file("small.png"), image);
+    write_small_calibration(size.width, size.height);
+    fs::remove_all(folder_ / "out");
+    const Outcome outcome = run(depth_of("small.png", "small.png", "small.yaml"));
+    EXPECT_EQ(outcome.exit_code, 0) << size << "\n" << outcome.output;
+    EXPECT_TRUE(fs::exists(folder_ / "out/summary1.png")) << size;
+  }
+}
+
 }  // namespace
 }  // namespace widestereo::test

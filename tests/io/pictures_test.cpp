@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <sstream>
 
@@ -110,6 +111,22 @@ TEST(Pictures, SheetHoldsAllPanels) {
   EXPECT_EQ(sheet.type(), CV_8UC3);
   EXPECT_THROW(panel_sheet({}, 2), Error);
   EXPECT_THROW(panel_sheet({{"a", grey}}, 0), Error);
+}
+
+TEST(Pictures, TakeImagesOfAnySize) {
+  for (const int cols : {1, 2, 3, 8, 9, 10, 11, 12, 63, 64, 65}) {
+    for (const int rows : {1, 2, 9, 70}) {
+      const cv::Mat picture(rows, cols, CV_8UC3, cv::Scalar(1, 2, 3));
+      for (const cv::Mat& with : {with_distance_legend(picture, {1, 5}),
+                                  with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
+        EXPECT_EQ(with.cols, std::max(cols, 64));
+        EXPECT_EQ(cv::norm(with(cv::Rect({}, picture.size())), picture, cv::NORM_INF), 0);
+        const cv::Mat sheet = panel_sheet({{"image", picture}, {"legend", with}}, 4);
+        EXPECT_GT(sheet.rows, with.rows) << cols << "x" << rows;
+      }
+      EXPECT_NO_THROW(cloud_picture({}, Eigen::Isometry3d::Identity(), picture.size()));
+    }
+  }
 }
 
 TEST(PointCloud, PlacesPointsInTheWorld) {
