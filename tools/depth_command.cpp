@@ -70,6 +70,7 @@ void run_depth(const DepthArguments& arguments) {
   arguments.rig.leave_out_dark_rims(calibrated.rig, images);
   const MatchSettings settings =
       with_range(arguments.settings, calibrated, arguments.rig.calibration);
+  arguments.format.require_room_for(settings.options().max_distance);
 
   const std::vector<double> blurs = arguments.sharpness.blurs(rig, images);
   const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);

@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: MIT
 #include "result_folder.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "option_checks.h"
+#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/pictures.h"
 #include "widestereo/point_cloud.h"
@@ -153,7 +159,8 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
   record["conventions"] = {
       {"unit", contents.in_metres ? "metre" : "that of the reconstruction"},
       {"distance", "units along the unit viewing ray through the pixel centre; 0 = no value"},
-      {"distance_png", "16 bit, " + Json(format.png_scale).dump() + " to a unit"},
+      {"distance_png",
+       "16 bit, " + Json(format.png_scale).dump() + " to a unit; 0 also where 65535 is exceeded"},
       {"distance_accepted", "distance, 0 where reasons is not 0 and the pixel was not filled"},
       {"normals",
        "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
@@ -217,6 +224,19 @@ void FolderFormat::add_extras_to(CLI::App& command, const std::string& clouds) {
   command.add_flag("--clouds{false}", no_cloud, "Write point clouds (" + clouds + ")")
       ->group(group);
   command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
+}
+
+void FolderFormat::require_room_for(double max_distance) const {
+  constexpr double largest = std::numeric_limits<std::uint16_t>::max();
+  if (std::find(maps.begin(), maps.end(), "png") == maps.end()) return;
+  if (max_distance * png_scale <= largest) return;
+  const double scale = std::pow(10.0, std::floor(std::log10(largest / max_distance)));
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "A 16-bit PNG holds distances up to %g at --png-scale %g, but they reach to %g; "
+                "give --png-scale %g, say, or a nearer --max-distance.",
+                largest / png_scale, png_scale, max_distance, scale);
+  throw ws::Error(text);
 }
 
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,

@@ -25,6 +25,8 @@ struct FolderFormat {
   void add_for_many_frames_to(CLI::App& command);
   /// --clouds and --pictures alone: maps that are read again are TIFFs.
   void add_for_fused_images_to(CLI::App& command);
+  /// Throws Error where a PNG cannot hold distances up to this one.
+  void require_room_for(double max_distance) const;
 
  private:
   void add_maps_to(CLI::App& command);

@@ -336,6 +336,7 @@ void summarise(const Json& frames, bool warm) {
 }
 
 void run_sequence(const SequenceArguments& arguments) {
+  arguments.format.require_room_for(arguments.settings.options().max_distance);
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
   if (arguments.as_json) {

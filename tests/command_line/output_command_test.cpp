@@ -126,5 +126,24 @@ TEST_F(Output, PicturesAreOfAnySize) {
   }
 }
 
+TEST_F(Output, PngsMustHoldTheFarthestDistance) {
+  const std::string far = " --formats tiff,png --max-distance 66 ";
+  const std::string said = "--png-scale 1000, but they reach to 66; give --png-scale 100";
+  std::string depth = depth_of("left.png", "right.png");
+  depth.erase(depth.find(" --max-distance"));
+  expect_error(depth + far, said);
+  expect_error("demo --size 64 --device cpu -o " + file("out") + far, said);
+  for (const char* camera : {"cam0", "cam1"}) {
+    fs::create_directories(folder_ / "frames" / camera);
+    fs::copy_file(file("left.png"), folder_ / "frames" / camera / "0.png");
+  }
+  expect_error("sequence " + file("frames") + " -c " + file("calib.yaml") + " --device cpu -o " +
+                   file("out") + far,
+               said);
+  EXPECT_EQ(run(depth + far + "--png-scale 100").exit_code, 0);
+  fs::remove_all(folder_ / "out");
+  EXPECT_EQ(run(depth + " --formats png --max-distance 65.535").exit_code, 0);
+}
+
 }  // namespace
 }  // namespace widestereo::test
