@@ -7,6 +7,7 @@
 #include "benchmark_measurement.h"
 #include "benchmark_plot.h"
 #include "commands.h"
+#include "json_text.h"
 #include "match_settings.h"
 #include "option_checks.h"
 #include "roofline.h"
@@ -139,8 +140,8 @@ void run_benchmark(BenchmarkArguments a) {
       }
     }
   }
-  if (a.as_json) std::cout << rows.dump(2) << "\n";
-  if (!a.output.empty()) ws::write_text(a.output, rows.dump(2) + "\n");
+  if (a.as_json) std::cout << to_text(rows) << "\n";
+  if (!a.output.empty()) ws::write_text(a.output, to_text(rows) + "\n");
   if (!a.plot.empty()) ws::write_text(a.plot, benchmark_plot(bars));
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "commands.h"
+#include "json_text.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
 #include "widestereo/calibration.h"
@@ -111,7 +112,7 @@ void show(const CalibrationArguments& arguments) {
   }
   if (const auto& imu = calibration.rig.world_from_imu) json["imu"] = describe_imu(*imu);
   if (arguments.as_json) {
-    std::cout << json.dump(2) << "\n";
+    std::cout << to_text(json) << "\n";
     return;
   }
   std::printf("%s: %s\n", arguments.file.c_str(), name_of(calibration.format));
@@ -312,7 +313,7 @@ void refine(const CalibrationArguments& arguments) {
   if (arguments.as_json) {
     nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
     json.update(to_json(refined, pairs));
-    std::cout << json.dump(2) << "\n";
+    std::cout << to_text(json) << "\n";
     return;
   }
   print(refined, pairs, arguments.intrinsics);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "commands.h"
+#include "json_text.h"
 #include "roofline.h"
 #include "widestereo/device.h"
 
@@ -31,7 +32,7 @@ void print_devices(bool as_json) {
     std::cout << "\n";
   }
   if (as_json) {
-    std::cout << list.dump(2) << "\n";
+    std::cout << to_text(list) << "\n";
     return;
   }
   for (const auto& [kind, name] : {std::pair(widestereo::DeviceKind::cuda, "CUDA"),

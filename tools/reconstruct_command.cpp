@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"
@@ -261,7 +262,7 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   reconstruction.run();
   const Json& record = reconstruction.folders().record();
   if (arguments.as_json) {
-    std::cout << record.dump(2) << "\n";
+    std::cout << to_text(record) << "\n";
     return;
   }
   double accepted = 0;

@@ -11,6 +11,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "json_text.h"
 #include "option_checks.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -246,13 +247,13 @@ Json write_result_folder(const fs::path& folder, const FolderContents& contents,
     record["views"].push_back(ViewWriter(folder, contents, format, static_cast<int>(i)).write());
   }
   if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
-  ws::write_text(folder / "result.json", record.dump(2) + "\n");
+  ws::write_text(folder / "result.json", to_text(record) + "\n");
   return record;
 }
 
 void report(const Json& record, const fs::path& folder, bool as_json) {
   if (as_json) {
-    std::cout << record.dump(2) << "\n";
+    std::cout << to_text(record) << "\n";
     return;
   }
   std::printf("%s: %.2f s, %.0f million patch samples (preset %s)\n",

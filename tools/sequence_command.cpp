@@ -12,6 +12,7 @@
 
 #include "commands.h"
 #include "frame_settings.h"
+#include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"
@@ -340,7 +341,7 @@ void run_sequence(const SequenceArguments& arguments) {
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
   if (arguments.as_json) {
-    std::cout << run.folder().record().dump(2) << "\n";
+    std::cout << to_text(run.folder().record()) << "\n";
     return;
   }
   std::printf("%zu frames are in %s\n", run.folder().frames().size(), arguments.output.c_str());

@@ -145,5 +145,24 @@ TEST_F(Output, PngsMustHoldTheFarthestDistance) {
   EXPECT_EQ(run(depth + " --formats png --max-distance 65.535").exit_code, 0);
 }
 
+TEST_F(Output, NamesNeedNotBeUtf8) {
+  fs::copy_file(file("left.png"), file("l\xe9"
+                                       "ft.png"));
+  fs::copy_file(file("calib.yaml"), file("calib\xe9.yaml"));
+  const Outcome outcome = run(depth_of("l\xe9"
+                                       "ft.png",
+                                       "right.png", "calib\xe9.yaml") +
+                              "--json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  for (const std::string& text : {outcome.output, content("out/result.json")}) {
+    const std::string image = nlohmann::json::parse(text)["input"]["images"][0];
+    EXPECT_NE(image.find("l\xef\xbf\xbd"
+                         "ft.png"),
+              std::string::npos)
+        << image;
+  }
+  EXPECT_EQ(run("calibration show --json " + file("calib\xe9.yaml")).exit_code, 0);
+}
+
 }  // namespace
 }  // namespace widestereo::test
