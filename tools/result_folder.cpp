@@ -9,7 +9,9 @@
 #include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <regex>
 #include <string>
+#include <system_error>
 
 #include "json_text.h"
 #include "option_checks.h"
@@ -31,6 +33,28 @@ double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
 }
 
 constexpr const char* group = "Output";
+constexpr const char* result_record = "result.json";
+
+/// Removes what an earlier run has written into the folder or, interrupted, begun to; nothing else.
+/// The record goes first: without it the folder is not complete.
+void remove_earlier_result(const fs::path& folder) {
+  static const std::regex names(
+      R"(distance(_accepted)?\d+\.(tiff|pfm|png)|(normals|cost|confidence)\d+\.tiff|)"
+      R"(reasons\d+\.png|cloud\d+\.ply|(distance|normals|confidence|reasons)_preview\d+\.png|)"
+      R"(summary\d+\.png|\.writing-\d+-\d+)");
+  std::vector<fs::path> files = {folder / result_record};
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (std::regex_match(entry.path().filename().string(), names)) files.push_back(entry.path());
+  }
+  for (const fs::path& file : files) {
+    std::error_code error;
+    fs::remove(file, error);
+    if (error) {
+      throw ws::Error("Cannot remove " + file.string() + " of an earlier run: " + error.message() +
+                      "; choose another folder.");
+    }
+  }
+}
 
 /// Writes the files of one view and notes their names.
 class ViewWriter {
@@ -242,12 +266,13 @@ void FolderFormat::require_room_for(double max_distance) const {
 
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,
                          const FolderFormat& format) {
+  remove_earlier_result(folder);
   Json record = record_of(contents, format);
   for (std::size_t i = 0; i < contents.rig.views.size(); ++i) {
     record["views"].push_back(ViewWriter(folder, contents, format, static_cast<int>(i)).write());
   }
   if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
-  ws::write_text(folder / "result.json", to_text(record) + "\n");
+  ws::write_text(folder / result_record, to_text(record) + "\n");
   return record;
 }
 

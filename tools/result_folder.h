@@ -52,7 +52,8 @@ struct FolderContents {
   std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none
 };
 
-/// Writes the folder, each file atomically and the record result.json last; returns the record.
+/// Writes the folder, each file atomically and the record result.json last, so that a folder
+/// without it is not complete; returns the record. Files of an earlier result are removed first.
 nlohmann::ordered_json write_result_folder(const std::filesystem::path& folder,
                                            const FolderContents& contents,
                                            const FolderFormat& format);

@@ -164,5 +164,34 @@ TEST_F(Output, NamesNeedNotBeUtf8) {
   EXPECT_EQ(run("calibration show --json " + file("calib\xe9.yaml")).exit_code, 0);
 }
 
+TEST_F(Output, EarlierResultsAreRemoved) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,pfm").exit_code, 0);
+  const std::set<std::string> mine = {"cloud.ply",       "distance0.txt", "mask0.png",
+                                      "result.json.bak", "summary.png",   "my_cloud0.ply"};
+  for (const std::string& name : mine) folder_.write("out/" + name, "mine");
+  for (const char* name : {".writing-123-7", "summary12.png", "distance7.png"}) {
+    folder_.write(std::string("out/") + name, "of an earlier run");
+  }
+  ASSERT_EQ(run(depth_of("right.png", "left.png") + "--no-cloud --no-pictures").exit_code, 0);
+  std::set<std::string> expected = mine;
+  expected.insert("result.json");
+  for (const char* view : {"0", "1"}) {
+    for (const char* what : {"distance", "distance_accepted", "normals", "cost", "confidence"}) {
+      expected.insert(std::string(what) + view + ".tiff");
+    }
+    expected.insert(std::string("reasons") + view + ".png");
+  }
+  EXPECT_EQ(files_in("out"), expected);
+}
+
+TEST_F(Output, InterruptedResultsHaveNoRecord) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 0);
+  const Outcome outcome = run(depth_of("right.png", "left.png"), "trap '' XFSZ; ulimit -f 100;");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+  EXPECT_TRUE(fs::exists(folder_ / "out/distance0.tiff"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/result.json"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/distance1.tiff")) << "of the earlier run";
+}
+
 }  // namespace
 }  // namespace widestereo::test
