@@ -4,7 +4,8 @@
 #include <array>
 #include <cstring>
 #include <fstream>
-#include <iterator>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 #include "widestereo/error.h"
@@ -39,16 +40,38 @@ bool made_by(const std::vector<char>& data, const VkPhysicalDeviceProperties& de
          std::memcmp(header.pipelineCacheUUID, device.pipelineCacheUUID, VK_UUID_SIZE) == 0;
 }
 
+/// Of a file that begins as ours do.
+std::optional<FileHeader> header_of(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return std::nullopt;
+  const FileHeader expected;
+  FileHeader header;
+  header.magic = {};
+  std::ifstream(path, std::ios::binary).read(reinterpret_cast<char*>(&header), sizeof header);
+  return header.magic == expected.magic ? std::optional(header) : std::nullopt;
+}
+
+/// Whether nothing else is lost, however the file was given.
+bool may_be_replaced(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return !std::filesystem::exists(path, ignored) || header_of(path) ||
+         (std::filesystem::is_regular_file(path, ignored) &&
+          std::filesystem::is_empty(path, ignored));
+}
+
 /// The driver's data, empty unless the file is intact and of this device.
 std::vector<char> read_cache(const std::filesystem::path& path,
                              const VkPhysicalDeviceProperties& device) {
+  const std::optional<FileHeader> header = header_of(path);
+  std::error_code error;
+  if (!header || std::filesystem::file_size(path, error) != sizeof *header + header->bytes) {
+    return {};
+  }
+  std::vector<char> data(header->bytes);
   std::ifstream file(path, std::ios::binary);
-  FileHeader header;
-  const FileHeader expected;
-  if (!file.read(reinterpret_cast<char*>(&header), sizeof header)) return {};
-  const std::vector<char> data{std::istreambuf_iterator<char>(file), {}};
-  const bool intact = header.magic == expected.magic && header.bytes == data.size() &&
-                      header.checksum == checksum(data.data(), data.size());
+  file.seekg(sizeof *header);
+  file.read(data.data(), static_cast<std::streamsize>(data.size()));
+  const bool intact = file && header->checksum == checksum(data.data(), data.size());
   return intact && made_by(data, device) ? data : std::vector<char>{};
 }
 
@@ -83,6 +106,10 @@ void PipelineCache::save() {
   if (path_.empty()) return;
   std::vector<char> current = data();
   if (current == saved_) return;
+  if (!may_be_replaced(path_)) {
+    throw Error(path_.string() +
+                " is there already and is no pipeline cache; give the name of a new file.");
+  }
   FileHeader header;
   header.bytes = current.size();
   header.checksum = checksum(current.data(), current.size());

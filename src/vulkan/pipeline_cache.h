@@ -9,7 +9,7 @@
 namespace widestereo {
 
 /// Compiled pipelines kept in a file between runs. The file carries a checksum and is used only if
-/// it is intact and of this very device and driver; anything else is ignored and replaced.
+/// it is intact and of this very device and driver; other caches are ignored and replaced.
 class PipelineCache {
  public:
   /// `path`: empty for a cache that is not kept.
@@ -17,7 +17,8 @@ class PipelineCache {
 
   VkPipelineCache get() const { return cache_.get(); }
   bool loaded_from_file() const { return !saved_.empty(); }
-  /// Writes the file if the driver's data have changed. Throws Error when it cannot be written.
+  /// Writes the file if the driver's data have changed. Throws Error when it cannot be written or
+  /// is something else.
   void save();
 
  private:

@@ -437,14 +437,27 @@ TEST_F(VulkanCache, DamagedFilesAreIgnoredAndReplaced) {
   std::string flipped = intact;
   flipped.back() = static_cast<char>(flipped.back() ^ 1);
   const std::vector<std::string> damaged = {
-      "",           "no cache", intact.substr(0, intact.size() - 1),
-      intact + "x", flipped,    std::string(intact.size(), '\0')};
+      "", intact.substr(0, 9), intact.substr(0, intact.size() - 1), intact + "x", flipped};
   for (const std::string& content_before : damaged) {
     overwrite(content_before);
     EXPECT_FALSE(is_used());
     EXPECT_TRUE(same_bits(expected, match_with_cache()));
     EXPECT_TRUE(is_used());
   }
+}
+
+TEST_F(VulkanCache, OtherFilesAreNeitherReadNorReplaced) {
+  for (const std::string& content_before : {std::string("no cache"), std::string(500, '\0')}) {
+    overwrite(content_before);
+    EXPECT_FALSE(is_used());
+    EXPECT_THAT(error_of([this] { match_with_cache(); }), HasSubstr("is no pipeline cache"));
+    EXPECT_TRUE(content() == content_before);
+  }
+  std::filesystem::resize_file(path_, std::uintmax_t{1} << 40);  // sparse
+  EXPECT_THAT(error_of([this] { match_with_cache(); }), HasSubstr("is no pipeline cache"));
+  path_ = folder_ / "endless";
+  std::filesystem::create_symlink("/dev/full", path_);
+  EXPECT_THAT(error_of([this] { match_with_cache(); }), HasSubstr("is no pipeline cache"));
 }
 
 TEST_F(VulkanCache, UnwritablePathIsAnError) {

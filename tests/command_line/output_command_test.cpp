@@ -164,6 +164,27 @@ TEST_F(Output, NamesNeedNotBeUtf8) {
   EXPECT_EQ(run("calibration show --json " + file("calib\xe9.yaml")).exit_code, 0);
 }
 
+TEST_F(Output, PipelineCacheReplacesNothingElse) {
+  if (run("devices").output.find("vulkan:0") == std::string::npos) {
+    GTEST_SKIP() << "no Vulkan driver";
+  }
+  std::string depth = depth_of("left.png", "right.png");
+  depth.replace(depth.find("--device cpu"), 12, "--device vulkan --pipeline-cache");
+  const auto with_cache = [&](const std::string& cache) {
+    std::string arguments = depth;
+    return arguments.insert(arguments.find("--pipeline-cache") + 16, " " + cache);
+  };
+  folder_.write("notes.txt", "mine");
+  expect_error(with_cache(file("notes.txt")), "notes.txt is there already");
+  EXPECT_EQ(content("notes.txt"), "mine");
+  fs::resize_file(folder_.write("sparse", ""), std::uintmax_t{1} << 31);
+  expect_error(with_cache(file("sparse")), "sparse is there already");
+  fs::create_symlink("/dev/full", folder_ / "endless");
+  expect_error(with_cache(file("endless")), "endless is there already");
+  EXPECT_EQ(run(with_cache(file("new.bin"))).exit_code, 0);
+  EXPECT_EQ(run(with_cache(file("new.bin"))).exit_code, 0);
+}
+
 TEST_F(Output, EarlierResultsAreRemoved) {
   ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,pfm").exit_code, 0);
   const std::set<std::string> mine = {"cloud.ply",       "distance0.txt", "mask0.png",
