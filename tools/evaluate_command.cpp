@@ -86,6 +86,10 @@ void run_evaluate(EvaluateArguments a) {
   if (a.far_distance > 0) {
     far = ws::far_scores(prediction, truth, rig.views[a.view], rig.views[a.source], a.far_distance);
   }
+  if (scores.front().pixels == 0 && far.pixels == 0) {
+    throw ws::Error("There is no pixel to score in " + a.truth +
+                    ": none has a true distance and is valid; check it and --valid.");
+  }
   std::vector<ws::SparsificationPoint> curve;
   std::vector<ws::ReliabilityBin> bins;
   if (!a.confidence.empty()) {

@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
+#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/view_synthesis.h"
 
@@ -30,6 +31,11 @@ void run_synthesis(const SynthesisArguments& a) {
   const ws::SynthesisedView synthesised =
       ws::synthesise_view(distance, rig.views[0], other, rig.views[1]);
   const ws::SynthesisScores scores = ws::synthesis_scores(distance, image, synthesised);
+  if (scores.windows == 0) {
+    throw ws::Error("There is no textured window to score in " + a.image + " that " + a.other +
+                    " sees at the distances of " + a.distance +
+                    "; check that they belong together.");
+  }
   std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
   if (!a.picture.empty()) {
     cv::Mat picture;

@@ -185,6 +185,25 @@ TEST_F(Output, PipelineCacheReplacesNothingElse) {
   EXPECT_EQ(run(with_cache(file("new.bin"))).exit_code, 0);
 }
 
+TEST_F(Output, NothingToScoreIsAnError) {
+  cv::imwrite(file("truth.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
+  cv::imwrite(file("none.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.0)));
+  cv::imwrite(file("valid.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  const std::string evaluate = "evaluate " + file("truth.tiff") + " -c " + file("calib.yaml");
+  expect_error(evaluate + " --truth " + file("truth.tiff") + " --valid " + file("valid.png"),
+               "no pixel to score in " + file("truth.tiff"));
+  expect_error(evaluate + " --json --truth " + file("none.tiff"), "no pixel to score");
+  cv::imwrite(file("fov.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  EXPECT_EQ(run(evaluate + " --truth " + file("none.tiff") + " --far-distance 2 --field-of-view " +
+                file("fov.png"))
+                .exit_code,
+            0)
+      << "a sky alone";
+  const std::string images =
+      " " + file("left.png") + " " + file("right.png") + " -c " + file("calib.yaml");
+  expect_error("view-synthesis " + file("none.tiff") + images, "no textured window to score");
+}
+
 TEST_F(Output, EarlierResultsAreRemoved) {
   ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,pfm").exit_code, 0);
   const std::set<std::string> mine = {"cloud.ply",       "distance0.txt", "mask0.png",
