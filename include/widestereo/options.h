@@ -58,9 +58,12 @@ std::string to_string(Filter filter);
 
 /// Parameters of a match. Start from a preset and change what you need.
 struct Options {
+  /// What distances may be: the matcher squares them, and their inverses, in single precision.
+  static constexpr double least_distance = 1e-6, most_distance = 1e9;
+
   std::string preset = "paper";
-  double min_distance = 0.3;  ///< metres along the ray, > 0
-  double max_distance = 50;   ///< metres along the ray, > min_distance, finite
+  double min_distance = 0.3;  ///< metres along the ray, at least least_distance
+  double max_distance = 50;   ///< metres along the ray, > min_distance, at most most_distance
   std::uint32_t seed = 1;
 
   SearchMethod search = SearchMethod::random;

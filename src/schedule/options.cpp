@@ -77,11 +77,12 @@ Options Options::preset_named(const std::string& name) {
 std::vector<std::string> Options::preset_names() { return {"fast", "quality", "paper"}; }
 
 void validate(const Options& o) {
-  if (!std::isfinite(o.min_distance) || !std::isfinite(o.max_distance) || o.min_distance <= 0 ||
-      o.max_distance <= o.min_distance) {
-    throw Error(
-        "The distance range from " + text(o.min_distance) + " to " + text(o.max_distance) +
-        " m is not usable: give a positive nearest and a larger, finite farthest distance.");
+  if (!(o.min_distance >= Options::least_distance && o.min_distance < o.max_distance &&
+        o.max_distance <= Options::most_distance)) {
+    throw Error("The distance range from " + text(o.min_distance) + " to " + text(o.max_distance) +
+                " m is not usable: give a nearest distance and a larger "
+                "farthest one between " +
+                text(Options::least_distance) + " and " + text(Options::most_distance) + " m.");
   }
   require_between(o.window_radius, 1, 15, "window radius");
   require_between(o.first_iterations, 1, 100000, "first iterations");

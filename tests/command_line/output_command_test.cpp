@@ -233,5 +233,15 @@ TEST_F(Output, InterruptedResultsHaveNoRecord) {
   EXPECT_FALSE(fs::exists(folder_ / "out/distance1.tiff")) << "of the earlier run";
 }
 
+TEST_F(Output, DistancesMustFitSinglePrecision) {
+  std::string depth = depth_of("left.png", "right.png");
+  depth.erase(depth.find(" --min-distance"));
+  for (const char* range :
+       {"--min-distance 1e39 --max-distance 1e40", "--min-distance 1 --max-distance 2e9",
+        "--min-distance 1e-7 --max-distance 1"}) {
+    expect_error(depth + " " + range, "between 1e-06 and 1000000000.0 m");
+  }
+}
+
 }  // namespace
 }  // namespace widestereo::test
