@@ -5,6 +5,7 @@
 #include <fstream>
 #include <utility>
 
+#include "json_text.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -19,8 +20,8 @@ constexpr const char* result_record = "result.json";
 
 /// The first setting that differs, as "NAME is A there and B now"; empty if none does.
 std::string first_difference(const Json& there, const Json& now) {
-  const auto a = nlohmann::json::parse(there.dump());
-  const auto b = nlohmann::json::parse(now.dump());
+  const auto a = nlohmann::json::parse(to_text(there));
+  const auto b = nlohmann::json::parse(to_text(now));
   const nlohmann::json differences = nlohmann::json::diff(a, b);
   if (differences.empty()) return "";
   const auto path = nlohmann::json::json_pointer(differences[0]["path"].get<std::string>());
@@ -140,5 +141,5 @@ void ResultFolders::note(const std::string& key, Json value) {
 }
 
 void ResultFolders::write_record() const {
-  ws::write_text(folder_ / (kind_.name + ".json"), record_.dump(2) + "\n");
+  ws::write_text(folder_ / (kind_.name + ".json"), to_text(record_) + "\n");
 }

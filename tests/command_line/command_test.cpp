@@ -291,7 +291,7 @@ TEST_F(Command, BenchmarkFindsOutFirstWhetherItCanWrite) {
   expect_error(common + "-o " + file("nothere/x.json"), "nothere does not exist");
   expect_error(common + "--plot " + file("nothere/x.svg"), "nothere does not exist");
   fs::create_directory(folder_ / "folder.json");
-  expect_error(common + "-o " + file("folder.json"), "folder.json, which is a folder");
+  expect_error(common + "-o " + file("folder.json"), "folder.json: it is a folder");
   EXPECT_NE(run(common + "-o " + file("x.json")).output.find("There is no device \"none\""),
             std::string::npos);
   EXPECT_FALSE(fs::exists(folder_ / "x.json"));
