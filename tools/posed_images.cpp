@@ -54,6 +54,7 @@ PosedImages PosedImageSettings::read(const ws::Options& options) const {
   apply_masks(posed);
   if (masks.empty()) leave_out_dark_rims(posed);
   if (!ws::is_colmap_model(rig.calibration)) {
+    ws::validate(options);
     posed.selection = std::make_shared<const ws::ViewSelection>(
         centres_of(posed.views),
         ws::assumed_points(posed.views, options.min_distance, options.max_distance));

@@ -289,6 +289,9 @@ TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
                                   " -o " + file("out") + quick + "--min-views 1 ";
   const std::string poses = "--poses " + file("camera.txt");
   expect_error(reconstruct, "calib.yaml is no COLMAP model");
+  expect_error("reconstruct " + file("data") + " -c " + file("calib.yaml") + " -o " + file("out") +
+                   " --min-distance 9 --max-distance 8 " + poses,
+               "The distance range from 9");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
   const Outcome outcome = run(reconstruct + poses + " --count 2");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
