@@ -80,6 +80,7 @@ class EpipolarSphere {
   cv::Mat rectify(const cv::Mat& image, const ws::View& view, bool is_source) const {
     const Eigen::Matrix3d& camera_from_sphere =
         is_source ? source_from_sphere_ : reference_from_sphere_;
+    const ws::PreparedCamera camera(view.camera);
     cv::Mat map(rows_, columns_, CV_32FC2);
     cv::parallel_for_(cv::Range(0, rows_), [&](const cv::Range& range) {
       for (int y = range.start; y < range.end; ++y) {
@@ -89,7 +90,7 @@ class EpipolarSphere {
           const Eigen::Vector3d ray(std::cos(angle), std::sin(angle) * std::cos(longitude),
                                     std::sin(angle) * std::sin(longitude));
           Eigen::Vector2d pixel;
-          const bool seen = ws::project(view.camera, camera_from_sphere * ray, pixel);
+          const bool seen = camera.project(camera_from_sphere * ray, pixel);
           map.at<cv::Vec2f>(y, x) =
               seen ? cv::Vec2f(pixel.cast<float>().x(), pixel.cast<float>().y())
                    : cv::Vec2f(-9, -9);

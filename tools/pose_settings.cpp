@@ -51,7 +51,7 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
 }
 
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses) {
-  rig.add_to(command, ", or folder of a COLMAP model, whose unit distances then have");
+  rig.add_to(command, RigSettings::or_colmap);
   poses.add_to(
       command,
       "of images taken one after the other, all by camera 0 unless --views names others; by time, "

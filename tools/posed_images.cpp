@@ -40,7 +40,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
                       "set: ") +
               FrameSettings::layouts)
       ->required();
-  rig.add_to(command, ", or folder of a COLMAP model, whose unit distances then have");
+  rig.add_to(command, RigSettings::or_colmap);
   command.add_option(
       "--masks", masks,
       "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
@@ -53,7 +53,7 @@ PosedImages PosedImageSettings::read(const ws::Options& options) const {
   PosedImages posed = ws::is_colmap_model(rig.calibration) ? of_colmap() : of_trajectory();
   apply_masks(posed);
   if (masks.empty()) leave_out_dark_rims(posed);
-  if (!ws::is_colmap_model(rig.calibration)) {
+  if (posed.selection == nullptr) {
     ws::validate(options);
     posed.selection = std::make_shared<const ws::ViewSelection>(
         centres_of(posed.views),

@@ -25,3 +25,10 @@ void ProgressBar::show(double share) {
                std::string(filled, '#').c_str(), std::string(width - filled, '.').c_str(),
                100 * share, left);
 }
+
+std::function<void(double)> ProgressBar::part(std::size_t done, std::size_t count) {
+  if (!visible()) return {};
+  return [this, done, count](double share) {
+    show((static_cast<double>(done) + share) / static_cast<double>(count));
+  };
+}

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
+#include <functional>
 #include <string>
 
 /// A line on standard error with the share done and the time left; silent unless that is a
@@ -16,6 +18,9 @@ class ProgressBar {
   bool visible() const { return terminal_; }
   /// `share` in [0, 1].
   void show(double share);
+  /// Shows the share done of the one after `done` of `count` equal parts. Empty where nobody sees
+  /// it: a device need not wait between kernels then.
+  std::function<void(double)> part(std::size_t done, std::size_t count);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -62,16 +62,11 @@ std::vector<Images> groups_of(const PosedImages& images, const ReconstructArgume
 
 /// All that decides the results but the images, cameras and poses, which each result names.
 Json settings_of(const ReconstructArguments& a, const ws::DeviceInfo& device) {
-  const auto absolute = [](const std::string& path) {
-    return path.empty() ? path : fs::absolute(path).lexically_normal().string();
-  };
-  Json masks = Json::array();
-  for (const std::string& mask : a.images.rig.masks) masks.push_back(absolute(mask));
   return {{"program", "widestereo " WIDESTEREO_VERSION},
-          {"images", absolute(a.images.images)},
-          {"calibration", absolute(a.images.rig.calibration)},
-          {"mask", masks},
-          {"masks", absolute(a.images.masks)},
+          {"images", absolute_path(a.images.images)},
+          {"calibration", absolute_path(a.images.rig.calibration)},
+          {"mask", absolute_paths(a.images.rig.masks)},
+          {"masks", absolute_path(a.images.masks)},
           {"sources", a.sources},
           {"min_distance_given", a.settings.min_distance.has_value()},
           {"max_distance_given", a.settings.max_distance.has_value()},
@@ -158,13 +153,7 @@ class Reconstruction {
         with_range(arguments_.settings, calibrated, arguments_.images.rig.calibration);
     MatchingRun run{.options = settings.options(), .device = device_.info(), .result = {}};
     ws::Matcher matcher(device_, rig, run.options);
-    ws::Matcher::Progress progress;
-    if (bar.visible()) {
-      progress = [&](double share) {
-        bar.show((static_cast<double>(number) + share) / static_cast<double>(count));
-      };
-    }
-    run.result = matcher.match(pixels, progress);
+    run.result = matcher.match(pixels, bar.part(number, count));
     require_no_validation_messages(device_);
     for (std::size_t i = 0; i < group.size(); ++i) {
       if (!is_matched(group[i])) write(group, i, pixels[i], run);
@@ -204,9 +193,15 @@ class Reconstruction {
     matched_[image] = true;
   }
 
+  fs::path folder_of(std::size_t image) const {
+    return folders_.folder() / images_.views[image].name;
+  }
+  cv::Mat distance_of(std::size_t image) const {
+    return ws::read_map(folder_of(image) / "distance_accepted0.tiff");
+  }
   ws::ViewMaps maps_of(std::size_t image) const {
-    const fs::path folder = folders_.folder() / images_.views[image].name;
-    return {.distance = ws::read_map(folder / "distance_accepted0.tiff"),
+    const fs::path folder = folder_of(image);
+    return {.distance = distance_of(image),
             .normals = ws::read_map(folder / "normals0.tiff"),
             .image = images_.read(image),
             .confidence = ws::read_map(folder / "confidence0.tiff")};
@@ -234,7 +229,7 @@ class Reconstruction {
         [&bar](double share) { bar.show(share); });
     ws::write_ply(folders_.folder() / "cloud.ply", cloud);
     const std::size_t middle = numbers[numbers.size() / 2];
-    const ws::ColourRange range = ws::robust_range(maps_of(middle).distance);
+    const ws::ColourRange range = ws::robust_range(distance_of(middle));
     ws::write_image(
         folders_.folder() / "cloud_preview.png",
         ws::cloud_picture(cloud, viewpoint_behind(images_.views[middle].world_from_camera, range),

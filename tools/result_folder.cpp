@@ -33,8 +33,6 @@ double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
 }
 
 constexpr const char* group = "Output";
-constexpr const char* result_record = "result.json";
-
 /// Removes what an earlier run has written into the folder or, interrupted, begun to; nothing else.
 /// The record goes first: without it the folder is not complete.
 void remove_earlier_result(const fs::path& folder) {

@@ -13,6 +13,9 @@
 #include "widestereo/pictures.h"
 #include "widestereo/rig.h"
 
+/// The record of a result folder, which is written last.
+inline constexpr const char* result_record = "result.json";
+
 /// Which files are written.
 struct FolderFormat {
   std::vector<std::string> maps = {"tiff"};  ///< of distance: tiff, pfm, png

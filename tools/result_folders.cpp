@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "json_text.h"
+#include "result_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -16,7 +17,6 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr const char* unfinished = ".unfinished";
-constexpr const char* result_record = "result.json";
 
 /// The first setting that differs, as "NAME is A there and B now"; empty if none does.
 std::string first_difference(const Json& there, const Json& now) {
@@ -31,6 +31,11 @@ std::string first_difference(const Json& there, const Json& now) {
   return path.to_string().substr(1) + " is " + value(a) + " there and " + value(b) + " now";
 }
 
+/// The record of a result folder; discarded where there is none.
+Json record_in(const fs::path& folder) {
+  return Json::parse(std::ifstream(folder / result_record), nullptr, false);
+}
+
 /// Results are named by files of the data set, so they lie within the folder; a record that someone
 /// edited may say otherwise.
 bool is_within_folder(const fs::path& name) {
@@ -41,6 +46,16 @@ bool is_within_folder(const fs::path& name) {
 }
 
 }  // namespace
+
+std::string absolute_path(const std::string& path) {
+  return path.empty() ? path : fs::absolute(path).lexically_normal().string();
+}
+
+Json absolute_paths(const std::vector<std::string>& paths) {
+  Json absolute = Json::array();
+  for (const std::string& path : paths) absolute.push_back(absolute_path(path));
+  return absolute;
+}
 
 ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, bool overwrite)
     : folder_(std::move(folder)), kind_(std::move(kind)) {
@@ -92,7 +107,7 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
 
 bool ResultFolders::is_there(const Json& result) const {
   const fs::path path = folder_ / result["name"].get<std::string>();
-  const Json record = Json::parse(std::ifstream(path / result_record), nullptr, false);
+  const Json record = record_in(path);
   if (!record.is_object() || !record.contains("views")) return false;
   for (const Json& view : record["views"]) {
     if (!view.contains("files")) return false;
@@ -106,7 +121,7 @@ bool ResultFolders::is_there(const Json& result) const {
 void ResultFolders::remove(const std::string& name) const {
   const fs::path path = folder_ / name;
   if (!fs::exists(path)) return;
-  const Json record = Json::parse(std::ifstream(path / result_record), nullptr, false);
+  const Json record = record_in(path);
   const Json whose = record.is_object() ? record.value("input", Json()) : Json();
   if (!whose.is_object() || whose.value("run", "") != kind_.name) {
     throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +

@@ -9,6 +9,10 @@
 #include <string>
 #include <vector>
 
+/// As settings name files, so that another working directory makes no difference; empty if empty.
+std::string absolute_path(const std::string& path);
+nlohmann::ordered_json absolute_paths(const std::vector<std::string>& paths);
+
 class ResultFolders {
  public:
   using Json = nlohmann::ordered_json;

@@ -16,6 +16,10 @@ struct RigSettings {
   std::vector<std::string> masks;  ///< none, one for all images or one for each
   double max_theta = 0;            ///< degrees, 0 = as calibrated, or where images end
 
+  /// What else --calibration may be where images of a COLMAP model are taken, too.
+  static constexpr const char* or_colmap =
+      ", or folder of a COLMAP model, whose unit distances then have";
+
   /// Adds --mask and --max-theta.
   void add_fields_of_view_to(CLI::App& command);
   /// Adds these and --calibration; `or_other`: what else it may be.

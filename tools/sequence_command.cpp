@@ -96,17 +96,12 @@ void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& i
 /// All that decides the results of a frame.
 Json settings_of(const SequenceArguments& a, const Selection& selection, const ws::Options& options,
                  const ws::DeviceInfo& device) {
-  const auto absolute = [](const std::string& path) {
-    return path.empty() ? path : fs::absolute(path).lexically_normal().string();
-  };
-  Json masks = Json::array();
-  for (const std::string& mask : a.rig.masks) masks.push_back(absolute(mask));
   Json settings = {{"program", "widestereo " WIDESTEREO_VERSION},
-                   {"dataset", absolute(a.dataset)},
-                   {"calibration", absolute(a.rig.calibration)},
-                   {"masks", masks},
+                   {"dataset", absolute_path(a.dataset)},
+                   {"calibration", absolute_path(a.rig.calibration)},
+                   {"masks", absolute_paths(a.rig.masks)},
                    {"blurs", selection.blurs},
-                   {"poses", absolute(a.poses.file)},
+                   {"poses", absolute_path(a.poses.file)},
                    {"poses_of", selection.motion.of},
                    {"poses_tolerance", a.poses.tolerance},
                    {"first", a.frames.first},
@@ -213,12 +208,7 @@ class SequenceRun {
     const std::vector<cv::Mat> taken = read_images(source);
     require_sizes(source, taken, selection_.rig);
     const std::vector<cv::Mat> images = blurred(taken, selection_.blurs);
-    ws::Matcher::Progress progress;
-    if (bar_.visible()) {  // without it a device need not wait between kernels
-      progress = [this](double share) {
-        bar_.show((static_cast<double>(matched_) + share) / static_cast<double>(remaining_));
-      };
-    }
+    const ws::Matcher::Progress progress = bar_.part(matched_, remaining_);
     Frame frame;
     frame.run.options = options_;
     frame.run.device = device_.info();
