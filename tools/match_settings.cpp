@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "match_settings.h"
 
+#include <initializer_list>
 #include <map>
+#include <utility>
 
 #include "widestereo/error.h"
 
@@ -137,15 +139,33 @@ void MatchSettings::add_to(CLI::App& command) {
 }
 
 void MatchSettings::require_effect(const Options& options) const {
-  if (options.search == widestereo::SearchMethod::random) return;
-  for (const auto& [name, given] :
-       {std::pair("--iterations", first_iterations.has_value()),
-        {"--second-iterations", second_iterations.has_value()},
-        {"--refinements", refinements.has_value()},
-        {"--propagation raster", options.propagation == Propagation::raster}}) {
+  using Given = std::initializer_list<std::pair<const char*, bool>>;
+  const Given of_random = {{"--iterations", first_iterations.has_value()},
+                           {"--second-iterations", second_iterations.has_value()},
+                           {"--refinements", refinements.has_value()},
+                           {"--sampling", sampling.has_value()},
+                           {"--propagation raster", options.propagation == Propagation::raster}};
+  const Given of_pyramid = {{"--levels", levels.has_value()},
+                            {"--sweep-steps", sweep_steps.has_value()},
+                            {"--level-iterations", level_iterations.has_value()},
+                            {"--level-regressions", level_regressions.has_value()},
+                            {"--regression-radius", regression_radius.has_value()},
+                            {"--regression-steps", regression_steps.has_value()},
+                            {"--regression-scale", regression_scale.has_value()},
+                            {"--regression-precision", regression_precision.has_value()},
+                            {"--subpixel-match", subpixel_match.has_value()},
+                            {"--repair-radius", repair_radius.has_value()},
+                            {"--vote-radius", vote_radius.has_value()},
+                            {"--step-pixels", step_pixels.has_value()},
+                            {"--step-normal", step_normal.has_value()},
+                            {"--source-planes", source_planes.has_value()},
+                            {"--warm-regressions", warm_regressions.has_value()}};
+  const bool is_pyramid = options.search == widestereo::SearchMethod::pyramid;
+  for (const auto& [name, given] : is_pyramid ? of_random : of_pyramid) {
     if (!given) continue;
     throw widestereo::Error(std::string(name) + " has no effect with the preset " + options.preset +
-                            "; leave it out, or choose --preset paper.");
+                            "; leave it out, or choose --preset " +
+                            (is_pyramid ? "paper." : "fast or quality."));
   }
 }
 

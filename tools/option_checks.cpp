@@ -1,24 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "option_checks.h"
 
-#include <cmath>
-#include <cstdlib>
-#include <optional>
+#include "text/number.h"
 
 namespace {
-
-/// Empty where no number begins the word.
-std::optional<double> number_in(const std::string& word) {
-  char* end = nullptr;
-  const double value = std::strtod(word.c_str(), &end);
-  return end == word.c_str() ? std::nullopt : std::optional(value);
-}
 
 CLI::Validator word_check(bool of_number) {
   return CLI::Validator(
       [of_number](const std::string& word) -> std::string {
         if (word.empty()) return "the value is empty; give one, or leave the option out";
-        if (of_number && !std::isfinite(number_in(word).value_or(0))) {
+        if (of_number && !widestereo::number_of(word)) {
           return word + " is no finite number";
         }
         return "";
@@ -31,7 +22,7 @@ CLI::Validator word_check(bool of_number) {
 CLI::Validator positive_number() {
   return CLI::Validator(
       [](const std::string& word) -> std::string {
-        return number_in(word).value_or(0) > 0 ? "" : word + " is no number above 0";
+        return widestereo::number_of(word).value_or(0) > 0 ? "" : word + " is no number above 0";
       },
       "POSITIVE");
 }
@@ -39,7 +30,8 @@ CLI::Validator positive_number() {
 CLI::Validator non_negative_number() {
   return CLI::Validator(
       [](const std::string& word) -> std::string {
-        return number_in(word).value_or(-1) >= 0 ? "" : word + " is no number from 0 on";
+        return widestereo::number_of(word).value_or(-1) >= 0 ? ""
+                                                             : word + " is no number from 0 on";
       },
       "NONNEGATIVE");
 }

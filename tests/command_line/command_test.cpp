@@ -238,6 +238,10 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
     expect_error(depth + option, std::string(option).substr(0, std::string(option).find(' ')));
     expect_error(depth + "--preset fast " + option, "has no effect with the preset fast");
   }
+  for (const char* option : {"--levels 2", "--sweep-steps 8", "--vote-radius 3", "--step-pixels 1",
+                             "--source-planes false", "--level-iterations 1,1,1"}) {
+    expect_error(depth + "--preset paper " + option, "has no effect with the preset paper");
+  }
   EXPECT_FALSE(fs::exists(folder_ / "out"));
   expect_refusal(depth + "--poses-tolerance 0.1", "--poses");
   expect_refusal(sequence() + "--poses p.txt --no-motion", "excludes");
