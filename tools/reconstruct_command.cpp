@@ -30,8 +30,6 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr int most_sources = 7;
-// Images whose points may be those of an image, best first.
-constexpr std::size_t fused_with = 10;
 const cv::Size preview_size(1024, 768);
 
 struct ReconstructArguments {
@@ -219,7 +217,7 @@ class Reconstruction {
     }
     std::vector<std::vector<std::size_t>> others(views.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
-      for (const std::size_t other : images_.selection->sources(numbers[i], fused_with)) {
+      for (const std::size_t other : images_.selection->sources(numbers[i], images_.views.size())) {
         if (is_matched(other)) others[i].push_back(places[other]);
       }
     }

@@ -16,6 +16,8 @@ namespace widestereo {
 namespace {
 
 constexpr int no_point = -1;
+// Others that are looked at however much memory their clouds take.
+constexpr std::size_t least_others = 10;
 
 /// The points of one view.
 struct ViewCloud {
@@ -110,6 +112,16 @@ class Mean {
   int count_ = 0;
 };
 
+// A point stands for pixels that see it from less far than this times as far as its own, too.
+constexpr double as_fine = 1.2;
+
+/// What another view has where a point lies.
+enum class Finding { nothing, same_point, point_of_cloud, farther_surface };
+
+/// Whether a pixel is part of a point of the cloud: since an earlier view, or of the present one.
+/// Only the former is looked at, so that rows may be taken at once.
+enum Membership : std::uint8_t { free_pixel, taken, taken_now };
+
 /// A view beside the one whose pixels are taken.
 struct Neighbour {
   std::size_t number;
@@ -124,16 +136,21 @@ class Fusion {
   Fusion(const std::vector<View>& views, const MapsOfView& maps, const FusionOptions& options)
       : views_(views), options_(options), clouds_(views, maps, options.cache_bytes) {
     for (const View& view : views) {
-      used_.emplace_back(static_cast<std::size_t>(view.camera.width) *
-                         static_cast<std::size_t>(view.camera.height));
+      memberships_.emplace_back(static_cast<std::size_t>(view.camera.width) *
+                                static_cast<std::size_t>(view.camera.height));
     }
   }
 
   void add(std::size_t number, const std::vector<std::size_t>& others) {
     const Neighbour self = neighbour(number);
     std::vector<Neighbour> neighbours;
+    std::size_t bytes = self.cloud->bytes();
     for (const std::size_t other : others) {
-      if (other != number) neighbours.push_back(neighbour(other));
+      if (other == number) continue;
+      // The next view shares most of them, and finds them in the other half of the cache.
+      if (neighbours.size() >= least_others && bytes > options_.cache_bytes / 2) break;
+      neighbours.push_back(neighbour(other));
+      bytes += neighbours.back().cloud->bytes();
     }
     const cv::Mat& index = self.cloud->index;
     std::vector<PointCloud> rows(static_cast<std::size_t>(index.rows));
@@ -143,6 +160,8 @@ class Fusion {
       }
     });
     for (const PointCloud& row : rows) points_.insert(points_.end(), row.begin(), row.end());
+    settle(number);
+    for (const Neighbour& other : neighbours) settle(other.number);
   }
 
   PointCloud take() { return std::move(points_); }
@@ -154,52 +173,78 @@ class Fusion {
             clouds_.get(number)};
   }
 
-  std::uint8_t& used(const Neighbour& view, int x, int y) {
-    return used_[view.number][static_cast<std::size_t>(y) * view.cloud->index.cols + x];
+  std::uint8_t& membership(const Neighbour& view, int x, int y) {
+    return memberships_[view.number][static_cast<std::size_t>(y) * view.cloud->index.cols + x];
+  }
+
+  static bool is_taken(std::uint8_t& membership) {
+    return std::atomic_ref(membership).load(std::memory_order_relaxed) == taken;
+  }
+
+  static void take_now(std::uint8_t& membership) {
+    if (!is_taken(membership)) {
+      std::atomic_ref(membership).store(taken_now, std::memory_order_relaxed);
+    }
+  }
+
+  void settle(std::size_t number) {
+    for (std::uint8_t& membership : memberships_[number]) {
+      if (membership == taken_now) membership = taken;
+    }
   }
 
   void add_row(int y, const Neighbour& self, const std::vector<Neighbour>& neighbours,
                PointCloud& row) {
-    // Only views that come later look at what is marked here, so that rows may be taken at once.
     std::vector<std::uint8_t*> joined;
     for (int x = 0; x < self.cloud->index.cols; ++x) {
       const int index = self.cloud->index.at<int>(y, x);
-      if (index == no_point || used(self, x, y)) continue;
+      if (index == no_point || is_taken(membership(self, x, y))) continue;
       const CloudPoint& point = self.cloud->points[static_cast<std::size_t>(index)];
       Mean mean;
       mean.add(point, distance_from(self, point));
       joined.clear();
-      for (const Neighbour& other : neighbours) join({x, y}, point, self, other, mean, joined);
-      if (mean.count() < options_.min_views) continue;
-      row.push_back(mean.point());
-      for (std::uint8_t* mark : joined) {
-        std::atomic_ref(*mark).store(1, std::memory_order_relaxed);
+      int seen_through = 0;
+      bool is_known = false;
+      for (std::size_t i = 0; i < neighbours.size() && !is_known; ++i) {
+        const Finding found = join({x, y}, point, self, neighbours[i], mean, joined);
+        if (found == Finding::farther_surface) ++seen_through;
+        is_known = found == Finding::point_of_cloud;
       }
+      if (is_known || mean.count() < options_.min_views) continue;
+      if (options_.min_views > 1 && seen_through > mean.count()) continue;
+      row.push_back(mean.point());
+      take_now(membership(self, x, y));
+      for (std::uint8_t* pixel : joined) take_now(*pixel);
     }
   }
 
-  void join(const cv::Point& pixel, const CloudPoint& point, const Neighbour& self,
-            const Neighbour& other, Mean& mean, std::vector<std::uint8_t*>& joined) {
+  Finding join(const cv::Point& pixel, const CloudPoint& point, const Neighbour& self,
+               const Neighbour& other, Mean& mean, std::vector<std::uint8_t*>& joined) {
     Eigen::Vector2d position;
     const Eigen::Vector3d seen = other.camera_from_world * point.position.cast<double>();
-    if (!other.camera.project_into_image(seen, position)) return;
+    if (!other.camera.project_into_image(seen, position)) return Finding::nothing;
     const cv::Mat& index = other.cloud->index;
     const int x = static_cast<int>(std::floor(position.x() + 0.5));
     const int y = static_cast<int>(std::floor(position.y() + 0.5));
     const int found = index.at<int>(y, x);
-    if (found == no_point) return;
+    if (found == no_point) return Finding::nothing;
     const CloudPoint& candidate = other.cloud->points[static_cast<std::size_t>(found)];
-    if (std::abs(distance_towards(point, candidate, other) / seen.norm() - 1) >
-        options_.max_relative) {
-      return;
-    }
+    const double difference = distance_towards(point, candidate, other) / seen.norm() - 1;
+    if (difference > options_.max_relative) return Finding::farther_surface;
+    if (difference < -options_.max_relative) return Finding::nothing;
     const Eigen::Vector3d back = self.camera_from_world * candidate.position.cast<double>();
-    if (!self.camera.project(back, position)) return;
-    if ((position - Eigen::Vector2d(pixel.x, pixel.y)).norm() > options_.max_pixels) return;
+    if (!self.camera.project(back, position)) return Finding::nothing;
+    if ((position - Eigen::Vector2d(pixel.x, pixel.y)).norm() > options_.max_pixels) {
+      return Finding::nothing;
+    }
     const Eigen::Vector3d a = point.normal.cast<double>(), b = candidate.normal.cast<double>();
-    if (degrees_between(a, b) > options_.max_normal_angle) return;
-    mean.add(candidate, distance_from(other, candidate));
-    joined.push_back(&used(other, x, y));
+    if (degrees_between(a, b) > options_.max_normal_angle) return Finding::nothing;
+    const double distance = distance_from(other, candidate);
+    mean.add(candidate, distance);
+    joined.push_back(&membership(other, x, y));
+    return is_taken(*joined.back()) && distance <= as_fine * distance_from(self, point)
+               ? Finding::point_of_cloud
+               : Finding::same_point;
   }
 
   /// How far from the view the plane of a point of its is on the ray to another point: pixels that
@@ -221,7 +266,7 @@ class Fusion {
   const std::vector<View>& views_;
   const FusionOptions& options_;
   CloudCache clouds_;
-  std::vector<std::vector<std::uint8_t>> used_;  // of each view, row by row
+  std::vector<std::vector<std::uint8_t>> memberships_;  // of each view, row by row
   PointCloud points_;
 };
 

@@ -98,6 +98,89 @@ TEST_F(Fusion, WhatAgreesWithNoOtherViewIsLeftOut) {
   EXPECT_EQ(off(fuse_all(options)), patch.area());
 }
 
+TEST_F(Fusion, WhatMoreViewsSeeThroughThanHaveIsLeftOut) {
+  for (int i : {1, 2}) {
+    views_.push_back(views_[i]);
+    maps_.push_back(maps_[i]);
+  }
+  views_.push_back(views_[1]);
+  maps_.push_back(maps_[1]);
+  // Two views agree on something 10 % nearer than the plane.
+  const cv::Rect patch(24, 24, 16, 16);
+  for (int i : {0, 3}) {
+    maps_[i].distance = maps_[i].distance.clone();
+    maps_[i].distance(patch) *= 0.9;
+  }
+  views_[3].world_from_camera = views_[0].world_from_camera;
+  maps_[3] = maps_[0];
+  const auto wrong_of = [this](const std::vector<std::size_t>& others, int min_views) {
+    std::vector<std::vector<std::size_t>> lists(views_.size());
+    lists[0] = others;
+    FusionOptions options;
+    options.min_views = min_views;
+    const PointCloud cloud = fuse(
+        views_, lists, [this](std::size_t i) { return maps_[i]; }, options);
+    return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
+      return point.position.norm() < 5 && std::abs(from_plane(point)) > 0.1;
+    });
+  };
+  EXPECT_EQ(wrong_of({3}, 2), patch.area());
+  EXPECT_EQ(wrong_of({3, 1, 2}, 2), patch.area());
+  EXPECT_EQ(wrong_of({3, 1, 2, 4}, 2), 0);
+  EXPECT_GE(wrong_of({3, 1, 2, 4}, 1), patch.area());
+}
+
+TEST_F(Fusion, AsManyOthersAreLookedAtAsMemoryAllows) {
+  constexpr std::size_t count = 14;
+  std::vector<std::vector<std::size_t>> others(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) {
+      if (j != i) others[i].push_back(j);
+    }
+  }
+  const std::vector<View> same(count, views_[0]);
+  const auto one = static_cast<std::size_t>(cv::countNonZero(maps_[0].distance > 0));
+  const auto maps = [this](std::size_t) { return maps_[0]; };
+  FusionOptions options;
+  options.min_views = count;
+  EXPECT_EQ(fuse(same, others, maps, options).size(), one);
+  options.cache_bytes = 1;
+  EXPECT_TRUE(fuse(same, others, maps, options).empty());
+  options.min_views = 11;  // ten others
+  EXPECT_EQ(fuse(same, others, maps, options).size(), one);
+}
+
+TEST_F(Fusion, ViewsThatAreNotComparedWithEachOtherShareTheirPoints) {
+  const std::vector<View> same(6, views_[0]);
+  const auto maps = [this](std::size_t) { return maps_[0]; };
+  const std::vector<std::vector<std::size_t>> chain = {{1}, {0}, {1}, {0}, {1}, {0}};
+  const auto one = static_cast<std::size_t>(cv::countNonZero(maps_[0].distance > 0));
+  EXPECT_EQ(fuse(same, chain, maps).size(), one);
+}
+
+/// A wall 2 m ahead of one view and 1 m ahead of the other, where it is four times as fine.
+TEST_F(Fusion, CoarsePointsDoNotStandForFinePixels) {
+  Rig rig = render_demo(side).rig;
+  rig.views[0].world_from_camera.setIdentity();
+  rig.views[1].world_from_camera = Eigen::Translation3d(0, 0, 1);
+  const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
+  const auto maps = [&scene](std::size_t i) {
+    return ViewMaps{
+        .distance = scene.views[i].truth.distance, .normals = {}, .image = {}, .confidence = {}};
+  };
+  const auto points_ahead = [&](const std::vector<std::size_t>& order) {
+    const std::vector<View> views = {scene.rig.views[order[0]], scene.rig.views[order[1]]};
+    const PointCloud cloud = fuse(views, {{1}, {0}}, [&](std::size_t i) { return maps(order[i]); });
+    return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
+      return point.position.head<2>().norm() < 0.5F;
+    });
+  };
+  const auto fine = points_ahead({1, 0});
+  const auto both = points_ahead({0, 1});
+  // The far view's come first and take a quarter of the near one's pixels.
+  EXPECT_GT(10 * both, 8 * fine);
+}
+
 TEST_F(Fusion, NoiseIsAveraged) {
   cv::RNG random(3);
   for (ViewMaps& maps : maps_) {
