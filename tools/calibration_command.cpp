@@ -176,8 +176,9 @@ std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
 void check(const CalibrationArguments& arguments) {
   const cv::Mat left = ws::read_image(arguments.left);
   const cv::Mat right = ws::read_image(arguments.right);
-  const ws::CalibratedImages images = calibrated_images(
-      arguments.rig, arguments.poses, {arguments.left, arguments.right}, left.size());
+  const ws::CalibratedImages images =
+      calibrated_images(arguments.rig, arguments.poses, {arguments.left, arguments.right},
+                        left.size(), arguments.rig.colmap_model());
   const ws::View& first = images.rig.views[0];
   const ws::View& second = images.rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);

@@ -34,21 +34,21 @@ struct DepthArguments {
 };
 
 /// One image is joined by the best ones of its COLMAP model.
-std::vector<std::string> files_of(const DepthArguments& arguments) {
+std::vector<std::string> files_of(const DepthArguments& arguments,
+                                  const std::optional<ws::ColmapModel>& model) {
   std::vector<std::string> files = arguments.images;
   if (files.size() > 1) {
     if (!arguments.sources) return files;
     throw ws::Error("--sources chooses what joins one image, but " + std::to_string(files.size()) +
                     " were given; leave it out or give one.");
   }
-  if (!ws::is_colmap_model(arguments.rig.calibration)) {
+  if (!model) {
     throw ws::Error(
         "One image is not enough, unless --calibration is a COLMAP model to choose "
         "others from; give two or more.");
   }
-  const auto sources =
-      ws::colmap_sources(arguments.rig.calibration, files.front(),
-                         static_cast<std::size_t>(arguments.sources.value_or(default_sources)));
+  const auto sources = model->source_files(
+      files.front(), static_cast<std::size_t>(arguments.sources.value_or(default_sources)));
   if (sources.empty()) {
     throw ws::Error(arguments.rig.calibration + " has no image that shares points with " +
                     files.front() + "; give two or more images.");
@@ -58,11 +58,12 @@ std::vector<std::string> files_of(const DepthArguments& arguments) {
 }
 
 void run_depth(const DepthArguments& arguments) {
-  const std::vector<std::string> files = files_of(arguments);
+  const std::optional<ws::ColmapModel> model = arguments.rig.colmap_model();
+  const std::vector<std::string> files = files_of(arguments, model);
   std::vector<cv::Mat> images;
   for (const std::string& file : files) images.push_back(ws::read_image(file));
   ws::CalibratedImages calibrated =
-      calibrated_images(arguments.rig, arguments.poses, files, images.front().size());
+      calibrated_images(arguments.rig, arguments.poses, files, images.front().size(), model);
   const ws::Rig& rig = calibrated.rig;
   for (std::size_t i = 0; i < files.size(); ++i) {
     ws::require_calibrated_size(images[i], rig.views[i], files[i]);

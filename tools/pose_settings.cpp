@@ -61,13 +61,14 @@ void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses)
 
 ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
                                        const PoseSettings& pose_settings,
-                                       const std::vector<std::string>& files, cv::Size size) {
-  if (ws::is_colmap_model(rig_settings.calibration)) {
+                                       const std::vector<std::string>& files, cv::Size size,
+                                       const std::optional<ws::ColmapModel>& model) {
+  if (model) {
     if (pose_settings.given()) {
       throw ws::Error("--poses has no meaning with a COLMAP model (" + rig_settings.calibration +
                       "), which holds the poses; leave it out.");
     }
-    return rig_settings.colmap_images(files);
+    return rig_settings.colmap_images(*model, files);
   }
   if (!pose_settings.given()) return {rig_settings.rig_for_images(files.size(), size)};
   RigSettings settings = rig_settings;

@@ -141,7 +141,7 @@ void PosedImageSettings::apply_masks(PosedImages& posed) const {
   for (ws::View& view : posed.views) {
     const fs::path mask = fs::path(masks) / (view.name + ".png");
     if (!fs::exists(mask)) continue;
-    view.mask = ws::to_intensity(ws::read_image(mask), mask.string()) > 0;
+    view.mask = ws::read_mask(mask);
     ws::require_calibrated_size(view.mask, view, mask.string());
   }
 }

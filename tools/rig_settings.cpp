@@ -67,12 +67,18 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
   return rig;
 }
 
-ws::CalibratedImages RigSettings::colmap_images(const std::vector<std::string>& files) const {
+std::optional<ws::ColmapModel> RigSettings::colmap_model() const {
+  if (!ws::is_colmap_model(calibration)) return std::nullopt;
+  return ws::ColmapModel(calibration);
+}
+
+ws::CalibratedImages RigSettings::colmap_images(const ws::ColmapModel& model,
+                                                const std::vector<std::string>& files) const {
   if (!views.empty()) {
     throw ws::Error("--views has no meaning with a COLMAP model (" + calibration +
                     "), which names the camera of each image; leave it out.");
   }
-  ws::CalibratedImages images = ws::read_colmap(calibration, {files.begin(), files.end()});
+  ws::CalibratedImages images = model.calibrated_files({files.begin(), files.end()});
   limit_fields_of_view(images.rig);
   return images;
 }
@@ -87,7 +93,7 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
     if (max_theta > 0) view.camera.max_theta = max_theta * std::numbers::pi / 180;
     if (!masks.empty()) {
       const std::string& file = masks[masks.size() == 1 ? 0 : i];
-      view.mask = ws::to_intensity(ws::read_image(file), file) > 0;
+      view.mask = ws::read_mask(file);
       if (cv::countNonZero(view.mask) == 0) {
         throw ws::Error("The mask " + file +
                         " is 0 everywhere, so that no pixel is left; 0 means to ignore the pixel.");

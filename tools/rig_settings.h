@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,11 @@ struct RigSettings {
   /// The calibrated views of `image_count` images, in their order, with masks; `size` of the first
   /// image.
   widestereo::Rig rig_for_images(std::size_t image_count, cv::Size size) const;
-  /// The same for files of a COLMAP model.
-  widestereo::CalibratedImages colmap_images(const std::vector<std::string>& files) const;
+  /// Where the calibration is one.
+  std::optional<widestereo::ColmapModel> colmap_model() const;
+  /// The calibrated views of its images, with masks.
+  widestereo::CalibratedImages colmap_images(const widestereo::ColmapModel& model,
+                                             const std::vector<std::string>& files) const;
 
   /// Limits the cameras of which nothing says how far they see to what their images show, and says
   /// so; one image for each view.

@@ -51,6 +51,9 @@ class ColmapModel {
   /// models that have no equivalent here (thin prisms, division, equirectangular).
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const;
 
+  /// The same of the images of files.
+  CalibratedImages calibrated_files(const std::vector<std::filesystem::path>& files) const;
+
   /// From 0.75 of the 1st to 1.25 of the 99th percentile of the distances between the images and
   /// the points that they observe; nothing where that is fewer than 20.
   std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const;
@@ -58,19 +61,14 @@ class ColmapModel {
   /// Which images to match with each other, by the model's points.
   const ViewSelection& selection() const;
 
+  /// ViewSelection::sources() of the image of a file, as files of the folder of images that it lies
+  /// in by its name.
+  std::vector<std::filesystem::path> source_files(const std::filesystem::path& file,
+                                                  std::size_t count) const;
+
  private:
   class Implementation;
   std::unique_ptr<Implementation> implementation_;
 };
-
-/// ColmapModel::calibrated() of the images of files.
-CalibratedImages read_colmap(const std::filesystem::path& folder,
-                             const std::vector<std::filesystem::path>& files);
-
-/// ViewSelection::sources() of the image of a file, as files of the folder of images that it lies
-/// in by its name.
-std::vector<std::filesystem::path> colmap_sources(const std::filesystem::path& folder,
-                                                  const std::filesystem::path& file,
-                                                  std::size_t count);
 
 }  // namespace widestereo

@@ -36,6 +36,9 @@ cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
 /// Of a file.
 cv::Mat read_grey_levels(const std::filesystem::path& path);
 
+/// Reads a mask, CV_8UC1: 255 where the grey image of a file is above 0, 0 = ignore the pixel.
+cv::Mat read_mask(const std::filesystem::path& path);
+
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm or .png (16 bit, divided
 /// by `png_scale`, which is the PNG units per metre). Throws Error.
 cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);

@@ -194,21 +194,18 @@ std::optional<DistanceRange> ColmapModel::distances(const std::vector<std::size_
 
 const ViewSelection& ColmapModel::selection() const { return implementation_->selection(); }
 
-CalibratedImages read_colmap(const fs::path& folder, const std::vector<fs::path>& files) {
-  const ColmapModel model(folder);
+CalibratedImages ColmapModel::calibrated_files(const std::vector<fs::path>& files) const {
   std::vector<std::size_t> images;
-  for (const fs::path& file : files) images.push_back(model.image_of(file));
-  return model.calibrated(images);
+  for (const fs::path& file : files) images.push_back(image_of(file));
+  return calibrated(images);
 }
 
-std::vector<fs::path> colmap_sources(const fs::path& folder, const fs::path& file,
-                                     std::size_t count) {
-  const ColmapModel model(folder);
-  const std::size_t image = model.image_of(file);
-  const fs::path images = folder_of_images(file, model.names()[image]);
+std::vector<fs::path> ColmapModel::source_files(const fs::path& file, std::size_t count) const {
+  const std::size_t image = image_of(file);
+  const fs::path images = folder_of_images(file, names()[image]);
   std::vector<fs::path> sources;
-  for (const std::size_t source : model.selection().sources(image, count)) {
-    sources.push_back(images / model.names()[source]);
+  for (const std::size_t source : selection().sources(image, count)) {
+    sources.push_back(images / names()[source]);
   }
   return sources;
 }

@@ -65,10 +65,9 @@ Document load(const std::filesystem::path& path) {
                 "); check the permissions of its folder.");
   }
   if (is_colmap_model(path)) {
-    throw Error(
-        path.string() +
-        " is a COLMAP model, which calibrates images; only `depth`, `calibration check` and "
-        "`view-synthesis` take it.");
+    throw Error(path.string() +
+                " is a COLMAP model, which calibrates images; only `depth`, `reconstruct`, "
+                "`calibration check` and `view-synthesis` take it.");
   }
   require_no_part_of_a_model(path);
   if (type != std::filesystem::file_type::regular) {

@@ -217,6 +217,10 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
   return intensity;
 }
 
+cv::Mat read_mask(const std::filesystem::path& path) {
+  return to_intensity(read_image(path), path.string()) > 0;
+}
+
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name) {
   cv::Mat grey;
   to_intensity(image, name).convertTo(grey, CV_8U, 255);

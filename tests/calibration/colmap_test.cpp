@@ -83,7 +83,7 @@ class Colmap : public ::testing::Test {
   }
   CalibratedImages read(const std::vector<fs::path>& files = {"/data/left/a b.png",
                                                               "/data/left/b.png"}) {
-    return read_colmap(folder_.path(), files);
+    return ColmapModel(folder_.path()).calibrated_files(files);
   }
   std::string error(const std::vector<fs::path>& files = {"/data/left/a b.png",
                                                           "/data/left/b.png"}) {
@@ -231,12 +231,13 @@ TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {
                                "0.9 0 0 1 right/none.png\n1 2 99\n");
   folder_.write("points3D.txt", points + "99 0 0 5 9 9 9 0.5 1 1\n");
   using Files = std::vector<fs::path>;
-  EXPECT_EQ(colmap_sources(folder_.path(), "/data/left/a.png", 2),
+  const ColmapModel model(folder_.path());
+  EXPECT_EQ(model.source_files("/data/left/a.png", 2),
             (Files{"/data/right/far.png", "/data/left/few.png"}));
-  EXPECT_EQ(colmap_sources(folder_.path(), "/data/left/a.png", 9),
+  EXPECT_EQ(model.source_files("/data/left/a.png", 9),
             (Files{"/data/right/far.png", "/data/left/few.png", "/data/left/near.png"}));
-  EXPECT_EQ(colmap_sources(folder_.path(), "/data/right/none.png", 9), Files{});
-  EXPECT_NE(test::error_of([&] { colmap_sources(folder_.path(), "b.png", 1); }).find("b.png"),
+  EXPECT_EQ(model.source_files("/data/right/none.png", 9), Files{});
+  EXPECT_NE(test::error_of([&] { model.source_files("b.png", 1); }).find("b.png"),
             std::string::npos);
 }
 

@@ -148,6 +148,15 @@ TEST(Images, BecomeIntensities) {
   EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32FC1, cv::Scalar(3)), "x"), Error);
 }
 
+TEST(Images, MasksAreAllThatIsAboveZero) {
+  const TemporaryFolder folder;
+  write_image(folder / "mask.png", cv::Mat_<std::uint16_t>({1, 3}, {0, 1, 65535}));
+  const cv::Mat mask = read_mask(folder / "mask.png");
+  const cv::Mat expected = cv::Mat_<std::uint8_t>({1, 3}, {0, 255, 255});
+  ASSERT_EQ(mask.type(), expected.type());
+  EXPECT_EQ(cv::norm(mask, expected, cv::NORM_INF), 0);
+}
+
 TEST(BadFiles, AreNamed) {
   const TemporaryFolder folder;
   const auto message = [&](const std::filesystem::path& path) {
