@@ -61,6 +61,7 @@ ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, b
     : folder_(std::move(folder)), kind_(std::move(kind)) {
   kind_.texts.emplace_back("name");
   ws::prepare_output_folder(folder_);
+  lock_.emplace(folder_);
   read(settings, overwrite);
   std::error_code ignored;
   fs::remove_all(folder_ / unfinished, ignored);

@@ -6,8 +6,11 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "folder_lock.h"
 
 /// As settings name files, so that another working directory makes no difference; empty if empty.
 std::string absolute_path(const std::string& path);
@@ -57,6 +60,7 @@ class ResultFolders {
   void write_record() const;
 
   std::filesystem::path folder_;
+  std::optional<FolderLock> lock_;
   Kind kind_;
   Json record_;
   std::vector<std::string> obsolete_;  // names of results to be removed

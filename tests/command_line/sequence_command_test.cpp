@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
 // `widestereo sequence` as a user meets it: layouts, resuming, scene cuts, messages.
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <Eigen/Geometry>
 #include <iomanip>
 #include <nlohmann/json.hpp>
@@ -135,6 +139,16 @@ TEST_F(SequenceCommand, OverwritingBeginsWithTheFirstNewFrame) {
   EXPECT_TRUE(fs::exists(folder_ / "out/001/distance0.tiff"));
   ASSERT_EQ(run(sequence() + "--overwrite --seed 5 --count 1").exit_code, 0);
   EXPECT_FALSE(fs::exists(folder_ / "out/001"));
+}
+
+TEST_F(SequenceCommand, TwoRunsNeedTwoFolders) {
+  fs::create_directories(folder_ / "out");
+  const int other = open((folder_ / "out").c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(flock(other, LOCK_EX | LOCK_NB), 0);
+  expect_error(sequence() + "--count 1", "Another run is writing to");
+  EXPECT_TRUE(fs::is_empty(folder_ / "out"));
+  close(other);
+  EXPECT_EQ(run(sequence() + "--count 1").exit_code, 0);
 }
 
 TEST_F(SequenceCommand, FoldersOfOthersAreLeftAlone) {
