@@ -8,6 +8,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calibration/match_rays.h"
 #include "geometry/angle.h"
 #include "geometry/validation.h"
 #include "statistics/percentile.h"
@@ -86,6 +87,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
   require_baseline(first, second, "The epipolar check");
   const Eigen::Isometry3d motion = source_from_reference(second, first);
   const Eigen::Vector3d epipole = motion.translation();
+  const MatchRays rays(first, second);
   std::vector<double> pixels;
   std::vector<double> angles;
   std::vector<double> distances;
@@ -93,11 +95,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
   for (const PixelMatch& match : matches) {
     Eigen::Vector3d ray_first;
     Eigen::Vector3d ray_second;
-    if (is_masked(first, match.first) || is_masked(second, match.second) ||
-        !unproject(first.camera, match.first, ray_first) ||
-        !unproject(second.camera, match.second, ray_second)) {
-      continue;
-    }
+    if (!rays.find(match, ray_first, ray_second)) continue;
     const Eigen::Vector3d rotated = motion.linear() * ray_first;
     const Eigen::Vector3d normal = epipole.cross(rotated);
     // A ray to the epipole lies in every epipolar plane.
@@ -105,7 +103,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
     const Eigen::Vector3d plane = normal.normalized();
     const double offset = plane.dot(ray_second);
     Eigen::Vector2d foot;
-    if (!project(second.camera, ray_second - offset * plane, foot)) continue;
+    if (!rays.second_camera().project(ray_second - offset * plane, foot)) continue;
     pixels.push_back((foot - match.second).norm());
     angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees);
     const double parallax = degrees_between(rotated, ray_second);

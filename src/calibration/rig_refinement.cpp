@@ -47,12 +47,13 @@ struct SeenRay {
   Eigen::Vector2d from_centre;           ///< of the pixel from the principal point
 };
 
-bool see(const View& view, const Eigen::Vector2d& pixel, SeenRay& seen) {
+bool see(const View& view, const PreparedCamera& camera, const Eigen::Vector2d& pixel,
+         SeenRay& seen) {
   Eigen::Vector3d ray;
   Eigen::Vector2d again;
   Eigen::Matrix<double, 2, 3> pixel_by_ray;
-  if (is_masked(view, pixel) || !unproject(view.camera, pixel, ray) ||
-      !project(view.camera, ray, again, pixel_by_ray)) {
+  if (is_masked(view, pixel) || !camera.unproject(pixel, ray) ||
+      !camera.project(ray, again, pixel_by_ray)) {
     return false;
   }
   const Eigen::Matrix3d& rotation = view.world_from_camera.linear();
@@ -171,23 +172,29 @@ class Refinement {
   }
 
   std::vector<Residual> residuals() const {
+    std::vector<PreparedCamera> cameras;
+    for (const View& view : rig_.views) cameras.emplace_back(view.camera);
     std::vector<Residual> residuals;
     for (const ViewMatches& pair : pairs_) {
       for (const PixelMatch& match : pair.matches) {
         Residual residual;
-        if (linearise(pair, match, residual)) residuals.push_back(residual);
+        if (linearise(pair, match, cameras, residual)) residuals.push_back(residual);
       }
     }
     return residuals;
   }
 
   /// The volume that both rays and the baseline span is 0 where they lie in a plane.
-  bool linearise(const ViewMatches& pair, const PixelMatch& match, Residual& residual) const {
+  bool linearise(const ViewMatches& pair, const PixelMatch& match,
+                 const std::vector<PreparedCamera>& cameras, Residual& residual) const {
     const View& first = rig_.views[pair.first];
     const View& second = rig_.views[pair.second];
     SeenRay a;
     SeenRay b;
-    if (!see(first, match.first, a) || !see(second, match.second, b)) return false;
+    if (!see(first, cameras[pair.first], match.first, a) ||
+        !see(second, cameras[pair.second], match.second, b)) {
+      return false;
+    }
     const Eigen::Vector3d between =
         second.world_from_camera.translation() - first.world_from_camera.translation();
     const Eigen::Vector3d baseline = between.normalized();

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "calibration/match_rays.h"
 #include "statistics/percentile.h"
 #include "widestereo/image_io.h"
 
@@ -44,15 +45,15 @@ cv::Point pixel_of(const Eigen::Vector2d& point, const cv::Mat& image) {
 }
 
 /// Side, radians, of the square that a pixel's rays fill; none where there are none.
-std::optional<double> pixel_angle(const Camera& camera, const Eigen::Vector2d& pixel) {
+std::optional<double> pixel_angle(const PreparedCamera& camera, const Eigen::Vector2d& pixel) {
   Eigen::Vector3d left;
   Eigen::Vector3d right;
   Eigen::Vector3d above;
   Eigen::Vector3d below;
-  if (!unproject(camera, pixel - Eigen::Vector2d(0.5, 0), left) ||
-      !unproject(camera, pixel + Eigen::Vector2d(0.5, 0), right) ||
-      !unproject(camera, pixel - Eigen::Vector2d(0, 0.5), above) ||
-      !unproject(camera, pixel + Eigen::Vector2d(0, 0.5), below)) {
+  if (!camera.unproject(pixel - Eigen::Vector2d(0.5, 0), left) ||
+      !camera.unproject(pixel + Eigen::Vector2d(0.5, 0), right) ||
+      !camera.unproject(pixel - Eigen::Vector2d(0, 0.5), above) ||
+      !camera.unproject(pixel + Eigen::Vector2d(0, 0.5), below)) {
     return std::nullopt;
   }
   return std::sqrt((right - left).cross(below - above).norm());
@@ -62,18 +63,14 @@ std::optional<double> pixel_angle(const Camera& camera, const Eigen::Vector2d& p
 class EqualScale {
  public:
   EqualScale(const View& first, const View& second)
-      : first_(first), second_(second), motion_(source_from_reference(second, first)) {}
+      : rays_(first, second), motion_(source_from_reference(second, first)) {}
 
   bool operator()(const PixelMatch& match) const {
     Eigen::Vector3d ray_first;
     Eigen::Vector3d ray_second;
-    if (is_masked(first_, match.first) || is_masked(second_, match.second) ||
-        !unproject(first_.camera, match.first, ray_first) ||
-        !unproject(second_.camera, match.second, ray_second)) {
-      return false;
-    }
-    const auto angle_first = pixel_angle(first_.camera, match.first);
-    const auto angle_second = pixel_angle(second_.camera, match.second);
+    if (!rays_.find(match, ray_first, ray_second)) return false;
+    const auto angle_first = pixel_angle(rays_.first_camera(), match.first);
+    const auto angle_second = pixel_angle(rays_.second_camera(), match.second);
     if (!angle_first || !angle_second) return false;
     // The law of sines gives the ratio of the distances.
     const Eigen::Vector3d baseline = motion_.translation();
@@ -85,8 +82,7 @@ class EqualScale {
   }
 
  private:
-  const View& first_;
-  const View& second_;
+  MatchRays rays_;
   Eigen::Isometry3d motion_;
 };
 
