@@ -178,7 +178,7 @@ void check(const CalibrationArguments& arguments) {
   const cv::Mat right = ws::read_image(arguments.right);
   const ws::CalibratedImages images =
       calibrated_images(arguments.rig, arguments.poses, {arguments.left, arguments.right},
-                        left.size(), arguments.rig.colmap_model());
+                        left.size(), arguments.rig.sfm_model());
   const ws::View& first = images.rig.views[0];
   const ws::View& second = images.rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);

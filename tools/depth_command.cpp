@@ -35,7 +35,7 @@ struct DepthArguments {
 
 /// One image is joined by the best ones of its COLMAP model.
 std::vector<std::string> files_of(const DepthArguments& arguments,
-                                  const std::optional<ws::ColmapModel>& model) {
+                                  const std::optional<ws::SfmModel>& model) {
   std::vector<std::string> files = arguments.images;
   if (files.size() > 1) {
     if (!arguments.sources) return files;
@@ -58,7 +58,7 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
 }
 
 void run_depth(const DepthArguments& arguments) {
-  const std::optional<ws::ColmapModel> model = arguments.rig.colmap_model();
+  const std::optional<ws::SfmModel> model = arguments.rig.sfm_model();
   const std::vector<std::string> files = files_of(arguments, model);
   std::vector<cv::Mat> images;
   for (const std::string& file : files) images.push_back(ws::read_image(file));

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "match_settings.h"
-#include "widestereo/colmap.h"
+#include "widestereo/sfm_model.h"
 #include "widestereo/matcher.h"
 
 struct MatchingRun {

@@ -51,7 +51,7 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
 }
 
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses) {
-  rig.add_to(command, RigSettings::or_colmap);
+  rig.add_to(command, RigSettings::or_model);
   poses.add_to(
       command,
       "of images taken one after the other, all by camera 0 unless --views names others; by time, "
@@ -62,13 +62,13 @@ void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses)
 ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
                                        const PoseSettings& pose_settings,
                                        const std::vector<std::string>& files, cv::Size size,
-                                       const std::optional<ws::ColmapModel>& model) {
+                                       const std::optional<ws::SfmModel>& model) {
   if (model) {
     if (pose_settings.given()) {
-      throw ws::Error("--poses has no meaning with a COLMAP model (" + rig_settings.calibration +
-                      "), which holds the poses; leave it out.");
+      throw ws::Error("--poses has no meaning with a COLMAP model or transforms.json (" +
+                      rig_settings.calibration + "), which holds the poses; leave it out.");
     }
-    return rig_settings.colmap_images(*model, files);
+    return rig_settings.images_of(*model, files);
   }
   if (!pose_settings.given()) return {rig_settings.rig_for_images(files.size(), size)};
   RigSettings settings = rig_settings;

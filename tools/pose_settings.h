@@ -39,7 +39,7 @@ void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses)
 
 /// The calibrated views of images as RigSettings gives them; with poses, of images that a rig, or
 /// one camera, took at different times: then all are of camera 0 unless `rig` names others, and the
-/// rig's frame is that of the first image. `model`: as RigSettings::colmap_model() gives it.
+/// rig's frame is that of the first image. `model`: as RigSettings::sfm_model() gives it.
 widestereo::CalibratedImages calibrated_images(const RigSettings& rig, const PoseSettings& poses,
                                                const std::vector<std::string>& files, cv::Size size,
-                                               const std::optional<widestereo::ColmapModel>& model);
+                                               const std::optional<widestereo::SfmModel>& model);

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 
+#include "matching_run.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -34,27 +35,28 @@ cv::Mat PosedImages::read(std::size_t image) const {
 
 void PosedImageSettings::add_to(CLI::App& command) {
   command
-      .add_option(
-          "images", images,
-          std::string("Folder that the names of a COLMAP model's images begin in; or a data "
-                      "set: ") +
-              FrameSettings::layouts)
+      .add_option("images", images,
+                  std::string("Folder that the names of the images in a COLMAP model or "
+                              "transforms.json begin in; or a data "
+                              "set: ") +
+                      FrameSettings::layouts)
       ->required();
-  rig.add_to(command, RigSettings::or_colmap);
+  rig.add_to(command, RigSettings::or_model);
   command.add_option(
       "--masks", masks,
       "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
       "the pixel");
-  poses.add_to(command, "what is not a COLMAP model needs it", "Data sets");
+  poses.add_to(command, "what is not a COLMAP model or transforms.json needs it", "Data sets");
   frames.add_to(command);
 }
 
-PosedImages PosedImageSettings::read(const ws::Options& options) const {
-  PosedImages posed = ws::is_colmap_model(rig.calibration) ? of_colmap() : of_trajectory();
+PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
+  PosedImages posed = ws::is_sfm_model(rig.calibration) ? of_model() : of_trajectory();
   apply_masks(posed);
   if (masks.empty()) leave_out_dark_rims(posed);
   if (posed.selection == nullptr) {
-    ws::validate(options);
+    const ws::CalibratedImages without_points{.rig = {}, .in_metres = posed.in_metres};
+    const ws::Options options = with_range(settings, without_points, rig.calibration).options();
     posed.selection = std::make_shared<const ws::ViewSelection>(
         centres_of(posed.views),
         ws::assumed_points(posed.views, options.min_distance, options.max_distance));
@@ -62,17 +64,17 @@ PosedImages PosedImageSettings::read(const ws::Options& options) const {
   return posed;
 }
 
-PosedImages PosedImageSettings::of_colmap() const {
+PosedImages PosedImageSettings::of_model() const {
   if (poses.given() || frames.given() || !rig.views.empty()) {
-    throw ws::Error("--poses, --views and the options of frames are for data sets, but " +
-                    rig.calibration +
-                    " is a COLMAP model, which has images and poses; leave them out.");
+    throw ws::Error(
+        "--poses, --views and the options of frames are for data sets, but " + rig.calibration +
+        " is a COLMAP model or transforms.json, which has images and poses; leave them out.");
   }
   if (rig.masks.size() > 1) {
-    throw ws::Error(
-        "--mask is for all images of a COLMAP model; give one, or a folder of masks by --masks.");
+    throw ws::Error("--mask is for all images of " + rig.calibration +
+                    "; give one, or a folder of masks by --masks.");
   }
-  const auto model = std::make_shared<const ws::ColmapModel>(rig.calibration);
+  const auto model = std::make_shared<const ws::SfmModel>(rig.calibration);
   PosedImages posed;
   posed.in_metres = false;
   Images all;
@@ -90,7 +92,7 @@ PosedImages PosedImageSettings::of_colmap() const {
     posed.views.push_back(one.views.front());
     all.push_back(i);
   }
-  posed.selection = {model, &model->selection()};
+  if (model->has_points()) posed.selection = {model, &model->selection()};
   posed.distances = [model, all](const Images& some) {
     const auto distances = model->distances(some);
     return distances ? distances : model->distances(all);
@@ -101,7 +103,8 @@ PosedImages PosedImageSettings::of_colmap() const {
 PosedImages PosedImageSettings::of_trajectory() const {
   if (!poses.given()) {
     throw ws::Error(rig.calibration +
-                    " is no COLMAP model, so that the poses of the images are not known; give "
+                    " is no COLMAP model or transforms.json, so that the poses of the images are "
+                    "not known; give "
                     "--poses.");
   }
   const int first = rig.views.empty() ? 0 : rig.views.front();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Many images of one scene whose cameras and poses are known: those of a COLMAP model, or of a rig
-// that moves along a trajectory.
+// Many images of one scene whose cameras and poses are known: those of a COLMAP model or
+// transforms.json, or of a rig that moves along a trajectory.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,7 +16,7 @@
 #include "match_settings.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
-#include "widestereo/colmap.h"
+#include "widestereo/sfm_model.h"
 #include "widestereo/view_selection.h"
 
 /// By their numbers.
@@ -45,11 +45,12 @@ struct PosedImageSettings {
 
   /// Adds all these options.
   void add_to(CLI::App& command);
-  /// Reads what is known of the images; `options` say how far a scene without known points reaches.
-  PosedImages read(const widestereo::Options& options) const;
+  /// Reads what is known of the images; `settings` say how far a scene without known points
+  /// reaches.
+  PosedImages read(const MatchSettings& settings) const;
 
  private:
-  PosedImages of_colmap() const;
+  PosedImages of_model() const;
   PosedImages of_trajectory() const;
   void apply_masks(PosedImages& images) const;
   void leave_out_dark_rims(PosedImages& images) const;

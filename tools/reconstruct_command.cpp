@@ -79,7 +79,7 @@ class Reconstruction {
  public:
   explicit Reconstruction(const ReconstructArguments& arguments)
       : arguments_(arguments),
-        images_(arguments.images.read(arguments.settings.options())),
+        images_(arguments.images.read(arguments.settings)),
         groups_(groups_of(images_, arguments)),
         device_(open_device(arguments.settings)),
         folders_(
@@ -269,10 +269,11 @@ void run_reconstruct(const ReconstructArguments& arguments) {
 }  // namespace
 
 void add_reconstruct_command(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("reconstruct",
-                                         "Match all images of a COLMAP model, or of a rig on a "
-                                         "known trajectory, and fuse their points "
-                                         "into one cloud; run it again to resume");
+  CLI::App* command =
+      app.add_subcommand("reconstruct",
+                         "Match all images of a COLMAP model or transforms.json, or of a rig on a "
+                         "known trajectory, and fuse their points "
+                         "into one cloud; run it again to resume");
   auto a = std::make_shared<ReconstructArguments>();
   a->images.add_to(*command);
   command

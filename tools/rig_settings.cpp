@@ -67,16 +67,16 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
   return rig;
 }
 
-std::optional<ws::ColmapModel> RigSettings::colmap_model() const {
-  if (!ws::is_colmap_model(calibration)) return std::nullopt;
-  return ws::ColmapModel(calibration);
+std::optional<ws::SfmModel> RigSettings::sfm_model() const {
+  if (!ws::is_sfm_model(calibration)) return std::nullopt;
+  return ws::SfmModel(calibration);
 }
 
-ws::CalibratedImages RigSettings::colmap_images(const ws::ColmapModel& model,
-                                                const std::vector<std::string>& files) const {
+ws::CalibratedImages RigSettings::images_of(const ws::SfmModel& model,
+                                            const std::vector<std::string>& files) const {
   if (!views.empty()) {
-    throw ws::Error("--views has no meaning with a COLMAP model (" + calibration +
-                    "), which names the camera of each image; leave it out.");
+    throw ws::Error("--views has no meaning with a COLMAP model or transforms.json (" +
+                    calibration + "), which names the camera of each image; leave it out.");
   }
   ws::CalibratedImages images = model.calibrated_files({files.begin(), files.end()});
   limit_fields_of_view(images.rig);

@@ -8,18 +8,18 @@
 #include <string>
 #include <vector>
 
-#include "widestereo/colmap.h"
 #include "widestereo/rig.h"
+#include "widestereo/sfm_model.h"
 
 struct RigSettings {
-  std::string calibration;         ///< file, or folder of a COLMAP model
+  std::string calibration;         ///< file, or what is_sfm_model() knows
   std::vector<int> views;          ///< cameras of the calibration; empty: the first ones
   std::vector<std::string> masks;  ///< none, one for all images or one for each
   double max_theta = 0;            ///< degrees, 0 = as calibrated, or where images end
 
-  /// What else --calibration may be where images of a COLMAP model are taken, too.
-  static constexpr const char* or_colmap =
-      ", or folder of a COLMAP model, whose unit distances then have";
+  /// What else --calibration may be where images with poses are taken, too.
+  static constexpr const char* or_model =
+      ", or folder of a COLMAP model, or transforms.json, whose unit distances then have";
 
   /// Adds --mask and --max-theta.
   void add_fields_of_view_to(CLI::App& command);
@@ -33,10 +33,10 @@ struct RigSettings {
   /// image.
   widestereo::Rig rig_for_images(std::size_t image_count, cv::Size size) const;
   /// Where the calibration is one.
-  std::optional<widestereo::ColmapModel> colmap_model() const;
+  std::optional<widestereo::SfmModel> sfm_model() const;
   /// The calibrated views of its images, with masks.
-  widestereo::CalibratedImages colmap_images(const widestereo::ColmapModel& model,
-                                             const std::vector<std::string>& files) const;
+  widestereo::CalibratedImages images_of(const widestereo::SfmModel& model,
+                                         const std::vector<std::string>& files) const;
 
   /// Limits the cameras of which nothing says how far they see to what their images show, and says
   /// so; one image for each view.

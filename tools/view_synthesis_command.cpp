@@ -26,7 +26,7 @@ void run_synthesis(const SynthesisArguments& a) {
   const cv::Mat image = ws::read_grey_levels(a.image);
   const cv::Mat other = ws::read_grey_levels(a.other);
   const ws::Rig rig =
-      calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.colmap_model()).rig;
+      calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
   const cv::Mat distance = ws::read_map(a.distance);
   ws::require_calibrated_size(image, rig.views[0], a.image);
   const ws::SynthesisedView synthesised =

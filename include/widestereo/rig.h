@@ -20,7 +20,7 @@ struct View {
 };
 
 /// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a
-/// rig's file, the reconstruction's with ColmapModel, whose unit then stands for metres).
+/// rig's file, the reconstruction's with SfmModel, whose unit then stands for metres).
 struct Rig {
   std::vector<View> views;
   /// X = T X_imu in the common frame, metres; none where no IMU was calibrated.

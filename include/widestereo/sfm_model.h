@@ -26,18 +26,19 @@ struct CalibratedImages {
 };
 
 /// Whether a path is a folder that COLMAP writes a reconstruction to (cameras and images, .bin or
-/// .txt).
-bool is_colmap_model(const std::filesystem::path& path);
+/// .txt), or a transforms.json as nerfstudio and Instant NGP have it.
+bool is_sfm_model(const std::filesystem::path& path);
 
-/// A reconstruction that COLMAP has written, binary or text. Images are numbered in the order of
-/// their names.
-class ColmapModel {
+/// Images whose cameras and poses structure from motion, or else, has found: a reconstruction that
+/// COLMAP has written, binary or text, or a transforms.json, which has no points. Images are
+/// numbered in the order of their names.
+class SfmModel {
  public:
   /// Reads the whole model. Throws Error naming the file and the remedy.
-  explicit ColmapModel(const std::filesystem::path& folder);
-  ~ColmapModel();
-  ColmapModel(ColmapModel&&) noexcept;
-  ColmapModel& operator=(ColmapModel&&) noexcept;
+  explicit SfmModel(const std::filesystem::path& path);
+  ~SfmModel();
+  SfmModel(SfmModel&&) noexcept;
+  SfmModel& operator=(SfmModel&&) noexcept;
 
   const std::vector<std::string>& names() const;
 
@@ -47,8 +48,9 @@ class ColmapModel {
 
   /// Calibration and poses of images, validated; views are named as the images are. The world frame
   /// and the unit of length are the reconstruction's: metres only where it was scaled to them.
-  /// COLMAP's pixel centres, at half pixels, are moved to whole ones. Throws Error, also for camera
-  /// models that have no equivalent here (thin prisms, division, equirectangular).
+  /// Pixel centres, at half pixels there, are moved to whole ones. Views have the masks that a
+  /// transforms.json names. Throws Error, also for camera models that have no equivalent here (thin
+  /// prisms, division, equirectangular).
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const;
 
   /// The same of the images of files.
@@ -57,6 +59,9 @@ class ColmapModel {
   /// From 0.75 of the 1st to 1.25 of the 99th percentile of the distances between the images and
   /// the points that they observe; nothing where that is fewer than 20.
   std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const;
+
+  /// Whether it has points that images observe; without any the selection is empty.
+  bool has_points() const;
 
   /// Which images to match with each other, by the model's points.
   const ViewSelection& selection() const;

@@ -19,6 +19,7 @@ struct ColmapImage {
   Eigen::Isometry3d camera_from_world = Eigen::Isometry3d::Identity();
   std::uint64_t camera = 0;
   std::vector<std::uint64_t> points;  ///< that it observes
+  std::filesystem::path mask = {};    ///< file of one; COLMAP's models have none
 };
 
 /// The file NAME.bin, else NAME.txt, of a model's folder; empty where there is neither.

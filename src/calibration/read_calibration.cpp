@@ -10,8 +10,8 @@
 #include "calibration/colmap_files.h"
 #include "calibration/formats.h"
 #include "geometry/validation.h"
-#include "widestereo/colmap.h"
 #include "widestereo/error.h"
+#include "widestereo/sfm_model.h"
 
 namespace widestereo {
 namespace calibration {
@@ -64,9 +64,10 @@ Document load(const std::filesystem::path& path) {
     throw Error("Cannot read " + path.string() + " (" + error.message() +
                 "); check the permissions of its folder.");
   }
-  if (is_colmap_model(path)) {
+  if (is_sfm_model(path)) {
     throw Error(path.string() +
-                " is a COLMAP model, which calibrates images; only `depth`, `reconstruct`, "
+                " is a COLMAP model or transforms.json, which calibrates images; only `depth`, "
+                "`reconstruct`, "
                 "`calibration check` and `view-synthesis` take it.");
   }
   require_no_part_of_a_model(path);

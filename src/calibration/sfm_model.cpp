@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "widestereo/colmap.h"
+#include "widestereo/sfm_model.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,10 @@
 #include <unordered_map>
 
 #include "calibration/colmap_files.h"
+#include "calibration/nerfstudio.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
+#include "widestereo/image_io.h"
 
 namespace widestereo {
 namespace {
@@ -44,10 +46,11 @@ fs::path folder_of_images(const fs::path& file, const fs::path& name) {
   return folder;
 }
 
-void require_model(const fs::path& folder) {
-  if (is_colmap_model(folder)) return;
-  throw Error(folder.string() +
-              " is no COLMAP model; give a folder with cameras and images, .bin or .txt.");
+void require_model(const fs::path& path) {
+  if (is_sfm_model(path)) return;
+  throw Error(path.string() +
+              " is no COLMAP model; give a folder with cameras and images, .bin or .txt, or a "
+              "transforms.json.");
 }
 
 std::map<std::uint64_t, ColmapCamera> cameras_of(const fs::path& file) {
@@ -61,28 +64,39 @@ std::vector<ColmapImage> images_of(const fs::path& file) {
   std::vector<ColmapImage> images;
   calibration::each_colmap_image(file,
                                  [&](ColmapImage image) { images.push_back(std::move(image)); });
-  std::stable_sort(images.begin(), images.end(),
-                   [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
   return images;
 }
 
 }  // namespace
 
-bool is_colmap_model(const fs::path& path) {
-  return !colmap_file(path, "cameras").empty() && !colmap_file(path, "images").empty();
+bool is_sfm_model(const fs::path& path) {
+  const bool is_colmap =
+      !colmap_file(path, "cameras").empty() && !colmap_file(path, "images").empty();
+  return is_colmap || calibration::is_transforms_file(path);
 }
 
-class ColmapModel::Implementation {
+class SfmModel::Implementation {
  public:
-  explicit Implementation(const fs::path& folder) : folder_(folder) {
-    require_model(folder);
-    cameras_file_ = colmap_file(folder, "cameras");
-    images_file_ = colmap_file(folder, "images");
-    cameras_ = cameras_of(cameras_file_);
-    images_ = images_of(images_file_);
+  explicit Implementation(const fs::path& path) : path_(path) {
+    require_model(path);
+    if (calibration::is_transforms_file(path)) {
+      cameras_file_ = images_file_ = path;
+      calibration::Transforms transforms = calibration::read_transforms(path);
+      cameras_ = std::move(transforms.cameras);
+      images_ = std::move(transforms.images);
+    } else {
+      cameras_file_ = colmap_file(path, "cameras");
+      images_file_ = colmap_file(path, "images");
+      cameras_ = cameras_of(cameras_file_);
+      images_ = images_of(images_file_);
+    }
+    std::stable_sort(images_.begin(), images_.end(),
+                     [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
     for (const ColmapImage& image : images_) names_.push_back(image.name);
     read_points();
   }
+
+  bool has_points() const { return !positions_.empty(); }
 
   const ViewSelection& selection() const { return selection_; }
 
@@ -101,7 +115,7 @@ class ColmapModel::Implementation {
     throw Error(images_file_.string() + " has no image whose name is the end of " + file.string() +
                 " among its " + std::to_string(names_.size()) +
                 (names_.empty() ? "" : " (the first is " + names_.front() + ")") +
-                "; give images that COLMAP has registered, in their folder.");
+                "; give images that it has, in their folder.");
   }
 
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const {
@@ -118,8 +132,11 @@ class ColmapModel::Implementation {
       view.name = image.name;
       view.camera = camera_of(camera->second, cameras_file_.string());
       view.world_from_camera = image.camera_from_world.inverse();
+      if (image.mask.empty()) continue;
+      view.mask = read_mask(image.mask);
+      require_calibrated_size(view.mask, view, image.mask.string());
     }
-    validate(calibrated.rig, folder_.string());
+    validate(calibrated.rig, path_.string());
     calibrated.distances = distances(images);
     return calibrated;
   }
@@ -147,7 +164,7 @@ class ColmapModel::Implementation {
       centres.push_back(image.camera_from_world.inverse().translation());
     }
     std::vector<ObservedPoint> points;
-    const fs::path file = colmap_file(folder_, "points3D");
+    const fs::path file = colmap_file(path_, "points3D");
     if (!file.empty()) {
       std::unordered_map<std::uint64_t, std::vector<std::size_t>> observers;
       for (std::size_t i = 0; i < images_.size(); ++i) {
@@ -164,7 +181,7 @@ class ColmapModel::Implementation {
     selection_ = ViewSelection(std::move(centres), std::move(points));
   }
 
-  fs::path folder_, cameras_file_, images_file_;
+  fs::path path_, cameras_file_, images_file_;
   std::map<std::uint64_t, ColmapCamera> cameras_;
   std::vector<ColmapImage> images_;  // in the order of names
   std::vector<std::string> names_;
@@ -172,35 +189,37 @@ class ColmapModel::Implementation {
   ViewSelection selection_{{}, {}};
 };
 
-ColmapModel::ColmapModel(const fs::path& folder)
-    : implementation_(std::make_unique<Implementation>(folder)) {}
-ColmapModel::~ColmapModel() = default;
-ColmapModel::ColmapModel(ColmapModel&&) noexcept = default;
-ColmapModel& ColmapModel::operator=(ColmapModel&&) noexcept = default;
+SfmModel::SfmModel(const fs::path& path)
+    : implementation_(std::make_unique<Implementation>(path)) {}
+SfmModel::~SfmModel() = default;
+SfmModel::SfmModel(SfmModel&&) noexcept = default;
+SfmModel& SfmModel::operator=(SfmModel&&) noexcept = default;
 
-const std::vector<std::string>& ColmapModel::names() const { return implementation_->names(); }
+const std::vector<std::string>& SfmModel::names() const { return implementation_->names(); }
 
-std::size_t ColmapModel::image_of(const fs::path& file) const {
+std::size_t SfmModel::image_of(const fs::path& file) const {
   return implementation_->image_of(file);
 }
 
-CalibratedImages ColmapModel::calibrated(const std::vector<std::size_t>& images) const {
+CalibratedImages SfmModel::calibrated(const std::vector<std::size_t>& images) const {
   return implementation_->calibrated(images);
 }
 
-std::optional<DistanceRange> ColmapModel::distances(const std::vector<std::size_t>& images) const {
+std::optional<DistanceRange> SfmModel::distances(const std::vector<std::size_t>& images) const {
   return implementation_->distances(images);
 }
 
-const ViewSelection& ColmapModel::selection() const { return implementation_->selection(); }
+bool SfmModel::has_points() const { return implementation_->has_points(); }
 
-CalibratedImages ColmapModel::calibrated_files(const std::vector<fs::path>& files) const {
+const ViewSelection& SfmModel::selection() const { return implementation_->selection(); }
+
+CalibratedImages SfmModel::calibrated_files(const std::vector<fs::path>& files) const {
   std::vector<std::size_t> images;
   for (const fs::path& file : files) images.push_back(image_of(file));
   return calibrated(images);
 }
 
-std::vector<fs::path> ColmapModel::source_files(const fs::path& file, std::size_t count) const {
+std::vector<fs::path> SfmModel::source_files(const fs::path& file, std::size_t count) const {
   const std::size_t image = image_of(file);
   const fs::path images = folder_of_images(file, names()[image]);
   std::vector<fs::path> sources;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "widestereo/colmap.h"
+#include "widestereo/sfm_model.h"
 
 #include <gtest/gtest.h>
 
@@ -83,7 +83,7 @@ class Colmap : public ::testing::Test {
   }
   CalibratedImages read(const std::vector<fs::path>& files = {"/data/left/a b.png",
                                                               "/data/left/b.png"}) {
-    return ColmapModel(folder_.path()).calibrated_files(files);
+    return SfmModel(folder_.path()).calibrated_files(files);
   }
   std::string error(const std::vector<fs::path>& files = {"/data/left/a b.png",
                                                           "/data/left/b.png"}) {
@@ -231,7 +231,7 @@ TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {
                                "0.9 0 0 1 right/none.png\n1 2 99\n");
   folder_.write("points3D.txt", points + "99 0 0 5 9 9 9 0.5 1 1\n");
   using Files = std::vector<fs::path>;
-  const ColmapModel model(folder_.path());
+  const SfmModel model(folder_.path());
   EXPECT_EQ(model.source_files("/data/left/a.png", 2),
             (Files{"/data/right/far.png", "/data/left/few.png"}));
   EXPECT_EQ(model.source_files("/data/left/a.png", 9),
@@ -261,7 +261,7 @@ TEST_F(Colmap, GroupsAreOfImagesThatSeeTheSame) {
   add("h", 0, 60);
   write_text(cameras_text, images);
   folder_.write("points3D.txt", points);
-  const ColmapModel model(folder_.path());
+  const SfmModel model(folder_.path());
   EXPECT_EQ(model.names(), (std::vector<std::string>{"a", "b", "c", "d", "e", "f", "g", "h"}));
   using Groups = std::vector<std::vector<std::size_t>>;
   // b has d and g at 5.1 degrees, f at 10.2; d has f at 5.1 and g at 10.3. g, which is left, is
@@ -271,7 +271,7 @@ TEST_F(Colmap, GroupsAreOfImagesThatSeeTheSame) {
   EXPECT_EQ(model.selection().groups(2), (Groups{{0, 2}, {1, 3}, {4, 2}, {5, 6}, {7}}));
   EXPECT_EQ(model.selection().groups(8), (Groups{{0, 2, 4}, {1, 3, 5, 6}, {7}}));
   fs::remove(folder_.path() / "points3D.txt");
-  EXPECT_EQ(ColmapModel(folder_.path()).selection().groups(3).size(), 8U);
+  EXPECT_EQ(SfmModel(folder_.path()).selection().groups(3).size(), 8U);
 }
 
 TEST_F(Colmap, ReadsBinaryPoints) {
@@ -350,10 +350,10 @@ TEST_F(Colmap, BadTextNamesFileAndLine) {
 
 TEST_F(Colmap, MissingPartsAreErrors) {
   EXPECT_NE(error().find("is no COLMAP model"), std::string::npos);
-  EXPECT_FALSE(is_colmap_model(folder_.path()));
-  EXPECT_FALSE(is_colmap_model(folder_.path() / "none"));
+  EXPECT_FALSE(is_sfm_model(folder_.path()));
+  EXPECT_FALSE(is_sfm_model(folder_.path() / "none"));
   write_text();
-  EXPECT_TRUE(is_colmap_model(folder_.path()));
+  EXPECT_TRUE(is_sfm_model(folder_.path()));
   EXPECT_NE(error({"left/c.png"})
                 .find("has no image whose name is the end of left/c.png among "
                       "its 3 (the first is b.png)"),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Images whose calibration is a COLMAP model.
+// Images whose calibration is a COLMAP model or a transforms.json.
 #include <nlohmann/json.hpp>
 
 #include "command_fixture.h"
@@ -236,10 +236,40 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   std::filesystem::copy_file(file("left.png"), folder_ / "images/away.png",
                              std::filesystem::copy_options::overwrite_existing);
   std::filesystem::remove(folder_ / "model/points3D.txt");
-  expect_error(reconstruct(), "has no images that see the same");
+  expect_error(reconstruct(), "give --min-distance and --max-distance");
   expect_error("reconstruct " + file("images") + " -c " + file("same.yaml") + " -o " + file("out"),
                "same.yaml is no COLMAP model");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
+/// Where no points tell which images see the same, poses and the range do.
+TEST_F(ReconstructCommand, TakesATransformsFile) {
+  const auto frame = [](const std::string& name, const std::string& x) {
+    return R"({"file_path": ")" + name + R"(", "transform_matrix": [[1, 0, 0, )" + x +
+           "], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]}";
+  };
+  folder_.write("images/transforms.json",
+                R"({"camera_model": "OPENCV_FISHEYE", "w": 96, "h": 96, "fl_x": 30, "fl_y": 31,
+                    "cx": 48, "cy": 48.5, "k1": 0.01, "k2": -0.002, "frames": [)" +
+                    frame("left.png", "0") + ", " + frame("right/1.png", "0.1") + "]}");
+  const std::string range = "--min-distance 0.75 --max-distance 5 ";
+  ASSERT_EQ(run(reconstruct("colmap") + range).exit_code, 0);
+  std::string with_transforms = reconstruct();
+  const std::string model = file("model");
+  with_transforms.replace(with_transforms.find(model), model.size(),
+                          file("images/transforms.json"));
+  expect_error(with_transforms, "give --min-distance and --max-distance");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+  const Outcome outcome = run(with_transforms + range);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  for (const char* image : {"left.png", "right/1.png"}) {
+    EXPECT_EQ(cv::norm(distance_in("out/" + std::string(image)),
+                       distance_in("colmap/" + std::string(image)), cv::NORM_INF),
+              0);
+  }
+  EXPECT_EQ(record_of("out/left.png")["conventions"]["unit"], "that of the reconstruction");
+  expect_error("calibration show " + file("images/transforms.json"),
+               "is a COLMAP model or transforms.json");
 }
 
 TEST_F(ReconstructCommand, FoldersOfOthersAreLeftAlone) {

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT
+#include "calibration/nerfstudio.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "calibration/formats.h"
+
+namespace widestereo::calibration {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr std::pair<const char*, double Camera::*> coefficient_keys[] = {
+    {"k1", &Camera::k1}, {"k2", &Camera::k2}, {"k3", &Camera::k3},
+    {"k4", &Camera::k4}, {"p1", &Camera::p1}, {"p2", &Camera::p2}};
+constexpr const char* camera_keys[] = {"camera_model", "is_fisheye", "fl_x", "fl_y", "cx",
+                                       "cy",           "w",          "h",    "k1",   "k2",
+                                       "k3",           "k4",         "p1",   "p2"};
+
+Json parsed(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return Json::parse(stream, nullptr, false);
+}
+
+bool has_frames(const Json& root) {
+  return root.is_object() && root.contains("frames") && root["frames"].is_array();
+}
+
+class Reader {
+ public:
+  explicit Reader(const fs::path& file) : document_{file, {}}, root_(parsed(file)) {
+    if (!has_frames(root_)) document_.fail("It has no list \"frames\"; is it damaged?");
+    if (root_["frames"].empty()) document_.fail("Its list \"frames\" is empty.");
+  }
+
+  Transforms read() const {
+    Transforms transforms;
+    for (std::size_t i = 0; i < root_["frames"].size(); ++i) {
+      const Json& frame = root_["frames"][i];
+      if (!frame.is_object()) fail(i, "It is no object.");
+      ColmapImage image = image_of(frame, i);
+      const bool has_own = std::any_of(std::begin(camera_keys), std::end(camera_keys),
+                                       [&frame](const char* key) { return frame.contains(key); });
+      image.camera = has_own ? i + 1 : 0;
+      if (!transforms.cameras.contains(image.camera)) {
+        transforms.cameras.emplace(image.camera, camera_of(frame, i));
+      }
+      transforms.images.push_back(std::move(image));
+    }
+    return transforms;
+  }
+
+ private:
+  [[noreturn]] void fail(std::size_t frame, const std::string& what) const {
+    document_.fail("Frame " + std::to_string(frame) + ": " + what);
+  }
+
+  /// The frame's own value, else that of all frames; null where there is none.
+  const Json* find(const Json& frame, const char* key) const {
+    if (frame.contains(key)) return &frame[key];
+    return root_.contains(key) ? &root_[key] : nullptr;
+  }
+
+  bool has(const Json& frame, const char* key) const { return find(frame, key) != nullptr; }
+
+  double number(const Json& frame, std::size_t i, const char* key) const {
+    const Json* value = find(frame, key);
+    if (value == nullptr || !value->is_number()) {
+      fail(i, "The number \"" + std::string(key) + "\" is missing.");
+    }
+    return value->get<double>();
+  }
+
+  double number_or(double otherwise, const Json& frame, std::size_t i, const char* key) const {
+    return has(frame, key) ? number(frame, i, key) : otherwise;
+  }
+
+  /// Of one axis; NeRF's data sets state the angle of view instead.
+  double focal_length(const Json& frame, std::size_t i, const char* key, const char* angle_key,
+                      double side) const {
+    if (has(frame, key) || !has(frame, angle_key)) return number(frame, i, key);
+    return side / 2 / std::tan(number(frame, i, angle_key) / 2);
+  }
+
+  std::string model_name(const Json& frame, std::size_t i) const {
+    const Json* fisheye = find(frame, "is_fisheye");
+    std::string name = fisheye != nullptr && *fisheye == true ? "OPENCV_FISHEYE" : "OPENCV";
+    if (const Json* given = find(frame, "camera_model")) {
+      if (!given->is_string()) fail(i, "\"camera_model\" is no string.");
+      name = given->get<std::string>();
+    }
+    // nerfstudio's radial-tangential model has k3, too.
+    return name == "OPENCV" && number_or(0, frame, i, "k3") != 0 ? "FULL_OPENCV" : name;
+  }
+
+  ColmapCamera camera_of(const Json& frame, std::size_t i) const {
+    const std::string name = model_name(frame, i);
+    const auto model = std::find_if(colmap_models().begin(), colmap_models().end(),
+                                    [&name](const ColmapModel& m) { return m.name == name; });
+    if (model == colmap_models().end() || !model->equivalent) {
+      fail(i, "The camera model " + name +
+                  " is not supported; OPENCV_FISHEYE, OPENCV and PINHOLE are.");
+    }
+    ColmapCamera camera;
+    camera.model = &*model;
+    camera.width = number(frame, i, "w");
+    camera.height = number(frame, i, "h");
+    const double fx = focal_length(frame, i, "fl_x", "camera_angle_x", camera.width);
+    const bool has_fy = has(frame, "fl_y") || has(frame, "camera_angle_y");
+    camera.parameters.push_back(fx);
+    if (model->focal_lengths == 2) {
+      camera.parameters.push_back(
+          has_fy ? focal_length(frame, i, "fl_y", "camera_angle_y", camera.height) : fx);
+    }
+    camera.parameters.push_back(number_or(camera.width / 2, frame, i, "cx"));
+    camera.parameters.push_back(number_or(camera.height / 2, frame, i, "cy"));
+    std::size_t used = 0;
+    std::size_t given = 0;
+    for (const auto& [key, member] : coefficient_keys) {
+      given += number_or(0, frame, i, key) != 0 ? 1 : 0;
+    }
+    for (double Camera::*member : model->coefficients) {
+      const auto key = std::find_if(std::begin(coefficient_keys), std::end(coefficient_keys),
+                                    [member](const auto& k) { return k.second == member; });
+      const double value =
+          key == std::end(coefficient_keys) ? 0 : number_or(0, frame, i, key->first);
+      camera.parameters.push_back(value);
+      used += value != 0 ? 1 : 0;
+    }
+    if (used != given) {
+      fail(i, "There are coefficients that the camera model " + name +
+                  " does not have; only k1 to "
+                  "k4, p1 and p2 of its own are supported.");
+    }
+    return camera;
+  }
+
+  ColmapImage image_of(const Json& frame, std::size_t i) const {
+    const auto text = [&](const char* key) {
+      if (!frame.contains(key) || !frame[key].is_string()) {
+        fail(i, "The string \"" + std::string(key) + "\" is missing.");
+      }
+      return fs::path(frame[key].get<std::string>()).lexically_normal();
+    };
+    ColmapImage image;
+    fs::path name = text("file_path");
+    // As NeRF's data sets name PNGs.
+    if (!name.has_extension()) name += ".png";
+    image.name = name.generic_string();
+    if (frame.contains("mask_path")) image.mask = document_.path.parent_path() / text("mask_path");
+    image.camera_from_world = pose_of(frame, i).inverse();
+    return image;
+  }
+
+  /// Of the camera, to world; the file's cameras look along -z, with y up.
+  Eigen::Isometry3d pose_of(const Json& frame, std::size_t i) const {
+    Eigen::Matrix<double, 3, 4> matrix;
+    const Json rows = frame.value("transform_matrix", Json());
+    bool complete = rows.is_array() && rows.size() >= 3;
+    for (int y = 0; complete && y < 3; ++y) {
+      complete = rows[y].is_array() && rows[y].size() == 4;
+      for (int x = 0; complete && x < 4; ++x) {
+        complete = rows[y][x].is_number();
+        if (complete) matrix(y, x) = rows[y][x].get<double>();
+      }
+    }
+    if (!complete) fail(i, "\"transform_matrix\" (4x4) is missing.");
+    const Eigen::Matrix3d axes = Eigen::Vector3d(1, -1, -1).asDiagonal();
+    return rigid(document_, "The transform_matrix of frame " + std::to_string(i),
+                 matrix.leftCols<3>() * axes, matrix.col(3));
+  }
+
+  Document document_;
+  Json root_;
+};
+
+}  // namespace
+
+bool is_transforms_file(const fs::path& path) {
+  std::error_code ignored;
+  return path.extension() == ".json" && fs::is_regular_file(path, ignored) &&
+         has_frames(parsed(path));
+}
+
+Transforms read_transforms(const fs::path& file) { return Reader(file).read(); }
+
+}  // namespace widestereo::calibration

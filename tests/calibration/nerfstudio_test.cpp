@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <random>
+#include <string>
+
+#include "error_of.h"
+#include "temporary_folder.h"
+#include "widestereo/image_io.h"
+#include "widestereo/sfm_model.h"
+
+namespace widestereo {
+namespace {
+
+// At (1, 2, 3), looking along +x, with z up; in OpenGL's axes: right, up, backwards.
+constexpr const char* pose = "[[0, 0, -1, 1], [-1, 0, 0, 2], [0, 1, 0, 3], [0, 0, 0, 1]]";
+constexpr const char* fisheye = R"("camera_model": "OPENCV_FISHEYE", "w": 96, "h": 80, "fl_x": 30,
+  "fl_y": 31, "cx": 48, "cy": 40.5, "k1": 0.01, "k2": -0.002, "k3": 0.0003, "k4": -0.0001)";
+
+std::string frame(const std::string& name, const std::string& more = "") {
+  return R"({"file_path": ")" + name + R"(", "transform_matrix": )" + pose + more + "}";
+}
+std::string file(const std::string& cameras, const std::string& frames) {
+  return "{" + cameras + (cameras.empty() ? "" : ", ") + R"("frames": [)" + frames + "]}";
+}
+
+class Nerfstudio : public ::testing::Test {
+ protected:
+  SfmModel model(const std::string& text) {
+    return SfmModel(folder_.write("transforms.json", text));
+  }
+  View view(const std::string& text, std::size_t image = 0) {
+    return model(text).calibrated({image}).rig.views.front();
+  }
+  std::string error(const std::string& text) {
+    return test::error_of([&] { model(text).calibrated({0}); });
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Nerfstudio, CamerasArePinholesAndFisheyes) {
+  const View seen = view(file(fisheye, frame("images/a.png")));
+  EXPECT_EQ(seen.name, "images/a.png");
+  EXPECT_EQ(seen.camera.model, CameraModel::kannala_brandt);
+  EXPECT_EQ(seen.camera.width, 96);
+  EXPECT_EQ(seen.camera.height, 80);
+  EXPECT_EQ(seen.camera.fx, 30);
+  EXPECT_EQ(seen.camera.fy, 31);
+  // The first pixel's centre is at a half there.
+  EXPECT_EQ(seen.camera.cx, 47.5);
+  EXPECT_EQ(seen.camera.cy, 40);
+  EXPECT_EQ(seen.camera.k1, 0.01);
+  EXPECT_EQ(seen.camera.k4, -0.0001);
+
+  const View radial = view(file(R"("w": 96, "h": 80, "fl_x": 60, "k1": 0.1, "k3": 0.02, "p2": 0.003,
+                                  "k4": 0)",
+                                frame("a.png")));
+  EXPECT_EQ(radial.camera.model, CameraModel::pinhole_radtan);
+  EXPECT_EQ(radial.camera.fy, 60);
+  EXPECT_EQ(radial.camera.cx, 47.5);
+  EXPECT_EQ(radial.camera.k1, 0.1);
+  EXPECT_EQ(radial.camera.k3, 0.02);
+  EXPECT_EQ(radial.camera.p2, 0.003);
+}
+
+TEST_F(Nerfstudio, InstantNgpsWordsAreKnown) {
+  const View seen = view(file(R"("camera_angle_x": 1.5707963267948966, "w": 100, "h": 80,
+                                "is_fisheye": true, "k1": 0.01)",
+                              frame("./images/r_0")));
+  EXPECT_EQ(seen.name, "images/r_0.png");
+  EXPECT_EQ(seen.camera.model, CameraModel::kannala_brandt);
+  EXPECT_NEAR(seen.camera.fx, 50, 1e-9);
+  EXPECT_NEAR(seen.camera.fy, 50, 1e-9);
+}
+
+TEST_F(Nerfstudio, PosesAreTurnedIntoOurAxes) {
+  const Eigen::Isometry3d world_from_camera = view(file(fisheye, frame("a.png"))).world_from_camera;
+  EXPECT_LT((world_from_camera.translation() - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
+  const Eigen::Matrix3d axes = world_from_camera.linear();
+  EXPECT_LT((axes.col(2) - Eigen::Vector3d(1, 0, 0)).norm(), 1e-12);   // ahead
+  EXPECT_LT((axes.col(1) - Eigen::Vector3d(0, 0, -1)).norm(), 1e-12);  // down
+  EXPECT_LT((axes.col(0) - Eigen::Vector3d(0, -1, 0)).norm(), 1e-12);  // right
+}
+
+TEST_F(Nerfstudio, FramesMayHaveTheirOwnCamerasAndMasks) {
+  write_image(folder_ / "mask.png", cv::Mat(80, 96, CV_8UC1, cv::Scalar(0)));
+  const std::string text = file(
+      fisheye, frame("b.png", R"(, "fl_x": 40, "mask_path": "mask.png")") + ", " + frame("a.png"));
+  const SfmModel model = this->model(text);
+  EXPECT_EQ(model.names(), (std::vector<std::string>{"a.png", "b.png"}));
+  EXPECT_FALSE(model.has_points());
+  const View a = model.calibrated({0}).rig.views.front();
+  EXPECT_EQ(a.camera.fx, 30);
+  EXPECT_TRUE(a.mask.empty());
+  const View b = model.calibrated({1}).rig.views.front();
+  EXPECT_EQ(b.camera.fx, 40);
+  EXPECT_EQ(b.camera.k1, 0.01);
+  EXPECT_EQ(b.mask.size(), cv::Size(96, 80));
+  EXPECT_EQ(cv::countNonZero(b.mask), 0);
+  EXPECT_FALSE(model.calibrated({0}).in_metres);
+}
+
+TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
+  const auto expect = [this](const std::string& text, const std::string& what) {
+    const std::string message = error(text);
+    EXPECT_NE(message.find("transforms.json"), std::string::npos) << message;
+    EXPECT_NE(message.find(what), std::string::npos) << message;
+  };
+  expect(file(fisheye, ""), "empty");
+  expect(file(fisheye, "3"), "Frame 0");
+  expect(file(fisheye, R"({"transform_matrix": []})"), "file_path");
+  expect(file(fisheye, R"({"file_path": "a.png"})"), "transform_matrix");
+  expect(file(fisheye, R"({"file_path": "a.png", "transform_matrix": [[1, 0], [0, 1], [0, 0]]})"),
+         "transform_matrix");
+  expect(file(fisheye, R"({"file_path": "a.png", "transform_matrix":
+                [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})"),
+         "rigid");
+  expect(file(R"("w": 9, "h": 9)", frame("a.png")), "fl_x");
+  expect(file(R"("fl_x": 9, "h": 9)", frame("a.png")), "\"w\"");
+  expect(file(R"("camera_model": "EQUIRECTANGULAR", "w": 9, "h": 9)", frame("a.png")),
+         "EQUIRECTANGULAR");
+  expect(file(std::string(fisheye) + R"(, "p1": 0.1)", frame("a.png")), "coefficients");
+  expect(file(R"("w": 9, "h": 9, "fl_x": 9, "k4": 0.1)", frame("a.png")), "coefficients");
+  EXPECT_NE(error(file(fisheye, frame("a.png", R"(, "mask_path": "none.png")"))).find("none.png"),
+            std::string::npos);
+}
+
+/// Whatever bytes come, there is a model or an Error.
+TEST_F(Nerfstudio, DamagedFilesNeverCrash) {
+  const std::string text = file(fisheye, frame("a.png") + ", " + frame("b.png"));
+  std::mt19937 random(5);
+  int refused = 0;
+  for (std::size_t size = 0; size < text.size(); size += 5) {
+    refused += !error(text.substr(0, size)).empty();
+  }
+  for (int round = 0; round < 300; ++round) {
+    std::string damaged = text;
+    for (int i = 0; i < 3; ++i) {
+      damaged[random() % damaged.size()] = static_cast<char>(random() % 256);
+    }
+    refused += !error(damaged).empty();
+  }
+  EXPECT_GT(refused, 200);
+}
+
+}  // namespace
+}  // namespace widestereo
