@@ -17,11 +17,22 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr std::pair<const char*, double Camera::*> coefficient_keys[] = {
-    {"k1", &Camera::k1}, {"k2", &Camera::k2}, {"k3", &Camera::k3},
-    {"k4", &Camera::k4}, {"p1", &Camera::p1}, {"p2", &Camera::p2}};
-constexpr const char* camera_keys[] = {"camera_model", "is_fisheye", "fl_x", "fl_y", "cx",
-                                       "cy",           "w",          "h",    "k1",   "k2",
-                                       "k3",           "k4",         "p1",   "p2"};
+    {"k1", &Camera::k1},
+    {"k2", &Camera::k2},
+    {"k3", &Camera::k3},
+    {"k4", &Camera::k4},
+    {"p1", &Camera::p1},
+    {"p2", &Camera::p2},
+    // Rational and thin-prism ones, which no camera here has.
+    {"k5", nullptr},
+    {"k6", nullptr},
+    {"sx1", nullptr},
+    {"sx2", nullptr},
+    {"sy1", nullptr},
+    {"sy2", nullptr}};
+constexpr const char* camera_keys[] = {
+    "camera_model",   "is_fisheye",    "w", "h", "cx", "cy", "fl_x", "fl_y",
+    "camera_angle_x", "camera_angle_y"};
 
 Json parsed(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -45,8 +56,11 @@ class Reader {
       const Json& frame = root_["frames"][i];
       if (!frame.is_object()) fail(i, "It is no object.");
       ColmapImage image = image_of(frame, i);
-      const bool has_own = std::any_of(std::begin(camera_keys), std::end(camera_keys),
-                                       [&frame](const char* key) { return frame.contains(key); });
+      const bool has_own =
+          std::any_of(std::begin(camera_keys), std::end(camera_keys),
+                      [&frame](const char* key) { return frame.contains(key); }) ||
+          std::any_of(std::begin(coefficient_keys), std::end(coefficient_keys),
+                      [&frame](const auto& key) { return frame.contains(key.first); });
       image.camera = has_own ? i + 1 : 0;
       if (!transforms.cameras.contains(image.camera)) {
         transforms.cameras.emplace(image.camera, camera_of(frame, i));
@@ -126,6 +140,10 @@ class Reader {
       given += number_or(0, frame, i, key) != 0 ? 1 : 0;
     }
     for (double Camera::*member : model->coefficients) {
+      if (member == nullptr) {
+        camera.parameters.push_back(0);
+        continue;
+      }
       const auto key = std::find_if(std::begin(coefficient_keys), std::end(coefficient_keys),
                                     [member](const auto& k) { return k.second == member; });
       const double value =
@@ -135,8 +153,7 @@ class Reader {
     }
     if (used != given) {
       fail(i, "There are coefficients that the camera model " + name +
-                  " does not have; only k1 to "
-                  "k4, p1 and p2 of its own are supported.");
+                  " does not have; only its own of k1 to k4, p1 and p2 are supported.");
     }
     return camera;
   }

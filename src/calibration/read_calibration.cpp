@@ -67,8 +67,7 @@ Document load(const std::filesystem::path& path) {
   if (is_sfm_model(path)) {
     throw Error(path.string() +
                 " is a COLMAP model or transforms.json, which calibrates images; only `depth`, "
-                "`reconstruct`, "
-                "`calibration check` and `view-synthesis` take it.");
+                "`reconstruct`, `calibration check` and `view-synthesis` take it.");
   }
   require_no_part_of_a_model(path);
   if (type != std::filesystem::file_type::regular) {

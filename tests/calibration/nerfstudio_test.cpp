@@ -122,7 +122,10 @@ TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
   expect(file(R"("camera_model": "EQUIRECTANGULAR", "w": 9, "h": 9)", frame("a.png")),
          "EQUIRECTANGULAR");
   expect(file(std::string(fisheye) + R"(, "p1": 0.1)", frame("a.png")), "coefficients");
-  expect(file(R"("w": 9, "h": 9, "fl_x": 9, "k4": 0.1)", frame("a.png")), "coefficients");
+  for (const char* key : {"k4", "k5", "sx1"}) {
+    expect(file(R"("w": 9, "h": 9, "fl_x": 9, ")" + std::string(key) + R"(": 0.1)", frame("a.png")),
+           "coefficients");
+  }
   EXPECT_NE(error(file(fisheye, frame("a.png", R"(, "mask_path": "none.png")"))).find("none.png"),
             std::string::npos);
 }
