@@ -39,6 +39,13 @@ const std::vector<ColmapModel>& colmap_models() {
   return models;
 }
 
+const ColmapModel* find_colmap_model(std::string_view name) {
+  for (const ColmapModel& model : colmap_models()) {
+    if (name == model.name) return &model;
+  }
+  return nullptr;
+}
+
 Camera camera_of(const ColmapCamera& record, const std::string& name) {
   const ColmapModel& model = *record.model;
   const std::string remedy =

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "widestereo/camera.h"
@@ -25,6 +26,8 @@ struct ColmapModel {
 
 /// All models, by COLMAP's number.
 const std::vector<ColmapModel>& colmap_models();
+/// The one of this name; null where there is none.
+const ColmapModel* find_colmap_model(std::string_view name);
 
 struct ColmapCamera {
   std::uint64_t number = 0;

@@ -144,9 +144,7 @@ class BinaryFile {
 };
 
 const ColmapModel& model_named(const std::string& name, const TextFile& file) {
-  for (const ColmapModel& model : colmap_models()) {
-    if (name == model.name) return model;
-  }
+  if (const ColmapModel* model = find_colmap_model(name)) return *model;
   file.fail("has the unknown camera model \"" + name + "\"");
 }
 

@@ -115,14 +115,13 @@ class Reader {
 
   ColmapCamera camera_of(const Json& frame, std::size_t i) const {
     const std::string name = model_name(frame, i);
-    const auto model = std::find_if(colmap_models().begin(), colmap_models().end(),
-                                    [&name](const ColmapModel& m) { return m.name == name; });
-    if (model == colmap_models().end() || !model->equivalent) {
+    const ColmapModel* model = find_colmap_model(name);
+    if (model == nullptr || !model->equivalent) {
       fail(i, "The camera model " + name +
                   " is not supported; OPENCV_FISHEYE, OPENCV and PINHOLE are.");
     }
     ColmapCamera camera;
-    camera.model = &*model;
+    camera.model = model;
     camera.width = number(frame, i, "w");
     camera.height = number(frame, i, "h");
     const double fx = focal_length(frame, i, "fl_x", "camera_angle_x", camera.width);
@@ -140,14 +139,11 @@ class Reader {
       given += number_or(0, frame, i, key) != 0 ? 1 : 0;
     }
     for (double Camera::*member : model->coefficients) {
-      if (member == nullptr) {
-        camera.parameters.push_back(0);
-        continue;
-      }
       const auto key = std::find_if(std::begin(coefficient_keys), std::end(coefficient_keys),
                                     [member](const auto& k) { return k.second == member; });
-      const double value =
-          key == std::end(coefficient_keys) ? 0 : number_or(0, frame, i, key->first);
+      const double value = member == nullptr || key == std::end(coefficient_keys)
+                               ? 0
+                               : number_or(0, frame, i, key->first);
       camera.parameters.push_back(value);
       used += value != 0 ? 1 : 0;
     }

@@ -46,8 +46,12 @@ fs::path folder_of_images(const fs::path& file, const fs::path& name) {
   return folder;
 }
 
-void require_model(const fs::path& path) {
-  if (is_sfm_model(path)) return;
+bool is_colmap_folder(const fs::path& path) {
+  return !colmap_file(path, "cameras").empty() && !colmap_file(path, "images").empty();
+}
+
+void require_colmap(const fs::path& path) {
+  if (is_colmap_folder(path)) return;
   throw Error(path.string() +
               " is no COLMAP model; give a folder with cameras and images, .bin or .txt, or a "
               "transforms.json.");
@@ -70,21 +74,19 @@ std::vector<ColmapImage> images_of(const fs::path& file) {
 }  // namespace
 
 bool is_sfm_model(const fs::path& path) {
-  const bool is_colmap =
-      !colmap_file(path, "cameras").empty() && !colmap_file(path, "images").empty();
-  return is_colmap || calibration::is_transforms_file(path);
+  return is_colmap_folder(path) || calibration::is_transforms_file(path);
 }
 
 class SfmModel::Implementation {
  public:
   explicit Implementation(const fs::path& path) : path_(path) {
-    require_model(path);
     if (calibration::is_transforms_file(path)) {
       cameras_file_ = images_file_ = path;
       calibration::Transforms transforms = calibration::read_transforms(path);
       cameras_ = std::move(transforms.cameras);
       images_ = std::move(transforms.images);
     } else {
+      require_colmap(path);
       cameras_file_ = colmap_file(path, "cameras");
       images_file_ = colmap_file(path, "images");
       cameras_ = cameras_of(cameras_file_);
