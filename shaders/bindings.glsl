@@ -29,8 +29,8 @@ layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]
 layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
 layout(push_constant) uniform PassBlock {
   PassParameters pass;
-#ifdef HAS_BUFFER_ROWS
-  BufferRows rows;
+#ifdef HAS_CONVERSION
+  ConversionParameters conversion;
 #endif
 };
 

@@ -8,7 +8,7 @@
 #include "camera.glsl"
 #include "parameters.glsl"
 
-#define HAS_BUFFER_ROWS
+#define HAS_CONVERSION
 #include "bindings.glsl"
 
 #include "maps.glsl"
@@ -18,21 +18,21 @@ layout(set = 1, binding = 0, std430) writeonly buffer MapBlock { uint map_words[
 void main() {
   ivec2 pixel;
   if (!thread_pixel(pass.reference, pixel)) return;
-  uint row = rows.first + uint(pixel.y) * rows.pitch;
+  uint row = conversion.first + uint(pixel.y) * conversion.pitch;
   uint x = uint(pixel.x);
   vec4 hypothesis = hypothesis_at(pass.reference, pixel);
   float distance = plane_distance(hypothesis, ray_at(pass.reference, pixel));
   vec4 checked = check_at(pass.reference, pixel);
-  if (rows.kind == MAP_NORMALS) {
+  if (conversion.kind == MAP_NORMALS) {
     vec3 normal = vec3(0.0f, 0.0f, 0.0f);
     if (distance > 0.0f) normal = plane_normal(hypothesis);
     map_words[row + 3u * x] = float_as_uint(normal.x);
     map_words[row + 3u * x + 1u] = float_as_uint(normal.y);
     map_words[row + 3u * x + 2u] = float_as_uint(normal.z);
-  } else if (rows.kind == MAP_REASONS) {
+  } else if (conversion.kind == MAP_REASONS) {
     map_words[row + x] = uint(checked.w);
   } else {
-    float value = rows.kind == MAP_DISTANCE ? distance : rows.kind == MAP_COST ? hypothesis.w : checked.z;
+    float value = conversion.kind == MAP_DISTANCE ? distance : conversion.kind == MAP_COST ? hypothesis.w : checked.z;
     map_words[row + x] = float_as_uint(value);
   }
 }

@@ -8,7 +8,7 @@
 #include "camera.glsl"
 #include "parameters.glsl"
 
-#define HAS_BUFFER_ROWS
+#define HAS_CONVERSION
 #include "bindings.glsl"
 
 #include "maps.glsl"
@@ -19,10 +19,10 @@ layout(set = 1, binding = 0, std430) readonly buffer ImageBlock { uint image_wor
 float value_at(uint byte, uint largest) { return float(image_words[byte >> 2] >> 8u * (byte & 3u) & largest); }
 
 float imported(ivec2 pixel) {
-  uint row = rows.first + uint(pixel.y) * rows.pitch;
+  uint row = conversion.first + uint(pixel.y) * conversion.pitch;
   uint x = uint(pixel.x);
-  if (rows.kind == PIXEL_GREY8) return value_at(row + x, 0xffu) * SCALE_OF_8_BITS;
-  if (rows.kind == PIXEL_GREY16) return value_at(row + 2u * x, 0xffffu) * SCALE_OF_16_BITS;
+  if (conversion.kind == PIXEL_GREY8) return value_at(row + x, 0xffu) * SCALE_OF_8_BITS;
+  if (conversion.kind == PIXEL_GREY16) return value_at(row + 2u * x, 0xffffu) * SCALE_OF_16_BITS;
   return intensity_or_masked(uint_as_float(image_words[(row >> 2) + x]));
 }
 

@@ -7,6 +7,10 @@
 #define PIXEL_GREY16 1
 #define PIXEL_INTENSITY 2
 
+// What makes the intensity of a texture's texels: the first component, or red, green and blue.
+#define TEXELS_GREY 0
+#define TEXELS_COLOUR 1
+
 // Largest values of 8 and 16 bits become 1.
 #define SCALE_OF_8_BITS (1.0f / 255.0f)
 #define SCALE_OF_16_BITS (1.0f / 65535.0f)
@@ -23,6 +27,9 @@
 FN float intensity_or_masked(float value) {
   return value >= 0.0f && value < ABOVE_INTENSITY ? value : MASKED_INTENSITY;
 }
+
+// Rec. 601, as OpenCV makes grey of colours.
+FN float luma(float red, float green, float blue) { return 0.299f * red + 0.587f * green + 0.114f * blue; }
 
 // Distance along the unit ray of the plane (m, cost) at a pixel, 0 where it holds none.
 FN float plane_distance(vec4 hypothesis, vec4 ray) {

@@ -118,9 +118,9 @@ struct PassParameters {
   int places;         // check: other places tried for a better match
 };
 
-// Push constants after those, where an application's buffer is read or written (Vulkan).
-struct BufferRows {
-  uint first;  // of row 0: bytes of an image, words of 4 bytes of a map
+// Push constants after those, where an application's image is read or map is written (Vulkan).
+struct ConversionParameters {
+  uint first;  // of row 0 in a buffer: bytes of an image, words of 4 bytes of a map
   uint pitch;  // from row to row, likewise
-  int kind;    // PIXEL_GREY8 and the like, or MAP_DISTANCE and the like
+  int kind;    // PIXEL_GREY8 and the like, TEXELS_GREY or TEXELS_COLOUR, or MAP_DISTANCE and the like
 };

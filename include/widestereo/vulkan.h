@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Matching inside a Vulkan application: its device, its command buffers, its buffers, no copies
-// through the host.
+// Matching inside a Vulkan application: its device, its command buffers, its images and buffers, no
+// copies through the host.
 //
-//   widestereo::VulkanMatcher matcher(handles, rig, options);        // once
-//   widestereo::VulkanImage images[] = {{left, 0, pitch}, {right, 0, pitch}};
+//   widestereo::VulkanMatcher matcher(handles, rig, options);  // once
+//   widestereo::VulkanTexture images[] = {{left}, {right}};    // or in buffers: VulkanImage
 //   widestereo::VulkanViewMaps maps[2];
 //   maps[0].distance = {distance, 0, 4 * width};           // what is left out is not written
-//   widestereo::VulkanBuffers buffers = matcher.bind(images, maps);  // for each set of buffers
-//   matcher.record(commands, buffers);               // per frame, or once for many submissions
-//   matcher.record_next(commands, buffers, {motion});  // or from the planes of the frame before
+//   widestereo::VulkanBindings bindings = matcher.bind(images, maps);  // for each set of them
+//   matcher.record(commands, bindings);              // per frame, or once for many submissions
+//   matcher.record_next(commands, bindings, {motion});  // or from the planes of the frame before
 #pragma once
 
 #include <vulkan/vulkan_core.h>
@@ -48,6 +48,17 @@ struct VulkanImage {
   PixelType pixel = PixelType::grey8;
 };
 
+/// A view's image as an image view, of the calibrated size: of type VK_IMAGE_VIEW_TYPE_2D, one
+/// sample a pixel, usage VK_IMAGE_USAGE_SAMPLED_BIT, and a format that shaders read as floats, as
+/// VK_FORMAT_R8_UNORM (also the luma plane of a camera's NV12), R16_UNORM, R32_SFLOAT or
+/// R8G8B8A8_UNORM. Values outside [0, 1], NaN included, and pixels beyond a smaller image count as
+/// masked. An sRGB format hands in linear values, not those of the file that a Matcher works with.
+struct VulkanTexture {
+  VkImageView view = VK_NULL_HANDLE;
+  VkImageLayout layout = VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL;  ///< while the commands run
+  bool colour = false;  ///< red, green and blue are weighted as cv::cvtColor does; else the first
+};
+
 /// A map in a buffer (VK_BUFFER_USAGE_STORAGE_BUFFER_BIT), of a view's size; without a buffer it is
 /// not written.
 struct VulkanMap {
@@ -67,16 +78,16 @@ struct VulkanViewMaps {
 
 /// Where a matcher reads its images and writes its maps. Must outlive the execution of what was
 /// recorded with it, and not the matcher.
-class VulkanBuffers {
+class VulkanBindings {
  public:
-  ~VulkanBuffers();
-  VulkanBuffers(VulkanBuffers&&) noexcept;
-  VulkanBuffers& operator=(VulkanBuffers&&) noexcept;
+  ~VulkanBindings();
+  VulkanBindings(VulkanBindings&&) noexcept;
+  VulkanBindings& operator=(VulkanBindings&&) noexcept;
 
  private:
   friend class VulkanMatcher;
   class Implementation;
-  explicit VulkanBuffers(std::unique_ptr<Implementation> implementation);
+  explicit VulkanBindings(std::unique_ptr<Implementation> implementation);
   std::unique_ptr<Implementation> implementation_;
 };
 
@@ -95,20 +106,24 @@ class VulkanMatcher {
   VulkanMatcher& operator=(VulkanMatcher&&) noexcept;
 
   /// For images and maps, one for each view. Throws Error for those that do not fit.
-  VulkanBuffers bind(std::span<const VulkanImage> images,
-                     std::span<const VulkanViewMaps> maps) const;
+  VulkanBindings bind(std::span<const VulkanImage> images,
+                      std::span<const VulkanViewMaps> maps) const;
+  VulkanBindings bind(std::span<const VulkanTexture> images,
+                      std::span<const VulkanViewMaps> maps) const;
 
   /// Records one match, outside a render pass, into a command buffer for a queue of the handles'
   /// family: reads the images and writes the maps. Neither submits, waits nor allocates. It waits
-  /// for earlier compute and transfer commands of the queue; whoever reads the maps puts a barrier
-  /// behind it (from VK_ACCESS_SHADER_WRITE_BIT of the compute stage). May be submitted again and
-  /// again. Where nothing overlaps, all costs are 2.
-  void record(VkCommandBuffer commands, const VulkanBuffers& buffers);
+  /// for earlier compute and transfer commands of the queue; images that other stages write, and
+  /// the layouts of textures, need a barrier before it (to VK_ACCESS_SHADER_READ_BIT of the compute
+  /// stage). Whoever reads the maps puts one behind it (from VK_ACCESS_SHADER_WRITE_BIT of the
+  /// compute stage), and so does whoever writes the next images. May be submitted again and again.
+  /// Where nothing overlaps, all costs are 2.
+  void record(VkCommandBuffer commands, const VulkanBindings& bindings);
 
   /// The same for the next frame of a sequence, from the planes that whatever ran before leaves on
   /// the device, as Matcher::match_next() does: a fraction of the work. `start` is fixed when it is
   /// recorded; its hypotheses must be empty. Throws Error where no match was recorded before.
-  void record_next(VkCommandBuffer commands, const VulkanBuffers& buffers,
+  void record_next(VkCommandBuffer commands, const VulkanBindings& bindings,
                    const WarmStart& start = {});
 
   std::size_t device_bytes() const;

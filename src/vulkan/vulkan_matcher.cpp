@@ -6,14 +6,14 @@
 #include "kernel/maps.h"
 #include "matching/device_rows.h"
 #include "matching/match_setup.h"
-#include "vulkan/buffer_conversions.h"
+#include "vulkan/conversions.h"
 #include "widestereo/error.h"
 #include "widestereo/vulkan.h"
 
 namespace widestereo {
 namespace {
 
-using Direction = BufferConversion::Direction;
+using Way = Conversion::Way;
 
 constexpr std::size_t word = sizeof(float);
 
@@ -34,7 +34,7 @@ constexpr std::array<MapOfView, 5> maps_of_view = {{
 
 }  // namespace
 
-class VulkanBuffers::Implementation {
+class VulkanBindings::Implementation {
  public:
   BoundConversions conversions;
   const void* matcher = nullptr;  ///< whose images and maps they are
@@ -54,43 +54,52 @@ class VulkanMatcher::Implementation {
     setup_.set_rays(backend_);
   }
 
-  VulkanBuffers bind(std::span<const VulkanImage> images,
-                     std::span<const VulkanViewMaps> maps) const {
-    const std::size_t views = rig_.views.size();
-    require_one_for_each_view(views, images.size(), maps.size());
-    std::vector<BufferConversion> conversions;
-    for (std::size_t i = 0; i < views; ++i) {
-      const int view = static_cast<int>(i);
-      const auto width = static_cast<std::size_t>(rig_.views[i].camera.width);
+  VulkanBindings bind(std::span<const VulkanImage> images,
+                      std::span<const VulkanViewMaps> maps) const {
+    require_one_for_each_view(rig_.views.size(), images.size(), maps.size());
+    std::vector<Conversion> conversions;
+    for (std::size_t i = 0; i < images.size(); ++i) {
       const VulkanImage& image = images[i];
       const std::size_t pixel = bytes_of(image.pixel);
+      const std::size_t row = width(i) * pixel;
       const std::string what = "The image of " + rig_.views[i].name;
       if (image.buffer == VK_NULL_HANDLE) throw Error(what + " has no buffer; give one.");
-      require_rows({image.offset, image.pitch, pixel, width * pixel, "offset"}, what);
-      conversions.push_back({Direction::import_image, view, static_cast<int>(image.pixel),
-                             image.buffer, image.offset, image.pitch, width * pixel});
-      for (const MapOfView& of_view : maps_of_view) {
-        const VulkanMap& map = maps[i].*of_view.map;
-        if (map.buffer == VK_NULL_HANDLE) continue;
-        const std::size_t row = width * of_view.values * word;
-        require_rows({map.offset, map.pitch, word, row, "offset"},
-                     of_view.name + rig_.views[i].name);
-        conversions.push_back(
-            {Direction::export_map, view, of_view.kind, map.buffer, map.offset, map.pitch, row});
-      }
+      require_rows({image.offset, image.pitch, pixel, row, "offset"}, what);
+      conversions.push_back({.way = Way::image_from_buffer,
+                             .view = static_cast<int>(i),
+                             .kind = static_cast<int>(image.pixel),
+                             .buffer = image.buffer,
+                             .offset = image.offset,
+                             .pitch = image.pitch,
+                             .row_bytes = row});
     }
-    auto buffers = std::make_unique<VulkanBuffers::Implementation>();
-    buffers->conversions = conversions_.bind(conversions);
-    buffers->matcher = this;
-    return VulkanBuffers(std::move(buffers));
+    return bind(std::move(conversions), maps);
   }
 
-  void record(VkCommandBuffer commands, const VulkanBuffers::Implementation& buffers) {
-    record(commands, buffers, setup_.schedule);
+  VulkanBindings bind(std::span<const VulkanTexture> images,
+                      std::span<const VulkanViewMaps> maps) const {
+    require_one_for_each_view(rig_.views.size(), images.size(), maps.size());
+    std::vector<Conversion> conversions;
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const VulkanTexture& image = images[i];
+      if (image.view == VK_NULL_HANDLE) {
+        throw Error("The image of " + rig_.views[i].name + " has no image view; give one.");
+      }
+      conversions.push_back({.way = Way::image_from_texture,
+                             .view = static_cast<int>(i),
+                             .kind = image.colour ? TEXELS_COLOUR : TEXELS_GREY,
+                             .texture = image.view,
+                             .layout = image.layout});
+    }
+    return bind(std::move(conversions), maps);
+  }
+
+  void record(VkCommandBuffer commands, const VulkanBindings::Implementation& bindings) {
+    record(commands, bindings, setup_.schedule);
     holds_planes_ = true;
   }
 
-  void record_next(VkCommandBuffer commands, const VulkanBuffers::Implementation& buffers,
+  void record_next(VkCommandBuffer commands, const VulkanBindings::Implementation& bindings,
                    const WarmStart& start) {
     if (!holds_planes_) {
       throw Error(
@@ -103,21 +112,50 @@ class VulkanMatcher::Implementation {
     }
     set_motion(setup_.warm_schedule, rig_,
                start.now_from_previous.value_or(Eigen::Isometry3d::Identity()), start.frame);
-    record(commands, buffers, setup_.warm_schedule);
+    record(commands, bindings, setup_.warm_schedule);
   }
 
   std::size_t device_bytes() const { return backend_.device_bytes(); }
 
  private:
-  void record(VkCommandBuffer commands, const VulkanBuffers::Implementation& buffers,
+  std::size_t width(std::size_t view) const {
+    return static_cast<std::size_t>(rig_.views[view].camera.width);
+  }
+
+  /// `conversions`: of the images.
+  VulkanBindings bind(std::vector<Conversion> conversions,
+                      std::span<const VulkanViewMaps> maps) const {
+    for (std::size_t i = 0; i < maps.size(); ++i) {
+      for (const MapOfView& of_view : maps_of_view) {
+        const VulkanMap& map = maps[i].*of_view.map;
+        if (map.buffer == VK_NULL_HANDLE) continue;
+        const std::size_t row = width(i) * of_view.values * word;
+        require_rows({map.offset, map.pitch, word, row, "offset"},
+                     of_view.name + rig_.views[i].name);
+        conversions.push_back({.way = Way::map_to_buffer,
+                               .view = static_cast<int>(i),
+                               .kind = of_view.kind,
+                               .buffer = map.buffer,
+                               .offset = map.offset,
+                               .pitch = map.pitch,
+                               .row_bytes = row});
+      }
+    }
+    auto bindings = std::make_unique<VulkanBindings::Implementation>();
+    bindings->conversions = conversions_.bind(conversions);
+    bindings->matcher = this;
+    return VulkanBindings(std::move(bindings));
+  }
+
+  void record(VkCommandBuffer commands, const VulkanBindings::Implementation& bindings,
               const Schedule& schedule) const {
-    if (buffers.matcher != this) {
-      throw Error("The buffers were bound by another matcher; use those of this one.");
+    if (bindings.matcher != this) {
+      throw Error("The bindings were made by another matcher; use those of this one.");
     }
     backend_.record_parameters(commands, schedule);
-    conversions_.record(commands, buffers.conversions, Direction::import_image);
+    conversions_.record_images(commands, bindings.conversions);
     backend_.record_dispatches(commands, schedule);
-    conversions_.record(commands, buffers.conversions, Direction::export_map);
+    conversions_.record_maps(commands, bindings.conversions);
   }
 
   Rig rig_;
@@ -125,15 +163,15 @@ class VulkanMatcher::Implementation {
   PipelineCache cache_;
   MatchSetup setup_;
   VulkanBackend backend_;
-  BufferConversions conversions_;
+  Conversions conversions_;
   bool holds_planes_ = false;
 };
 
-VulkanBuffers::VulkanBuffers(std::unique_ptr<Implementation> implementation)
+VulkanBindings::VulkanBindings(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
-VulkanBuffers::~VulkanBuffers() = default;
-VulkanBuffers::VulkanBuffers(VulkanBuffers&&) noexcept = default;
-VulkanBuffers& VulkanBuffers::operator=(VulkanBuffers&&) noexcept = default;
+VulkanBindings::~VulkanBindings() = default;
+VulkanBindings::VulkanBindings(VulkanBindings&&) noexcept = default;
+VulkanBindings& VulkanBindings::operator=(VulkanBindings&&) noexcept = default;
 
 VulkanMatcher::VulkanMatcher(const VulkanHandles& handles, const Rig& rig, const Options& options,
                              const std::string& pipeline_cache)
@@ -142,16 +180,20 @@ VulkanMatcher::~VulkanMatcher() = default;
 VulkanMatcher::VulkanMatcher(VulkanMatcher&&) noexcept = default;
 VulkanMatcher& VulkanMatcher::operator=(VulkanMatcher&&) noexcept = default;
 
-VulkanBuffers VulkanMatcher::bind(std::span<const VulkanImage> images,
-                                  std::span<const VulkanViewMaps> maps) const {
+VulkanBindings VulkanMatcher::bind(std::span<const VulkanImage> images,
+                                   std::span<const VulkanViewMaps> maps) const {
   return implementation_->bind(images, maps);
 }
-void VulkanMatcher::record(VkCommandBuffer commands, const VulkanBuffers& buffers) {
-  implementation_->record(commands, *buffers.implementation_);
+VulkanBindings VulkanMatcher::bind(std::span<const VulkanTexture> images,
+                                   std::span<const VulkanViewMaps> maps) const {
+  return implementation_->bind(images, maps);
 }
-void VulkanMatcher::record_next(VkCommandBuffer commands, const VulkanBuffers& buffers,
+void VulkanMatcher::record(VkCommandBuffer commands, const VulkanBindings& bindings) {
+  implementation_->record(commands, *bindings.implementation_);
+}
+void VulkanMatcher::record_next(VkCommandBuffer commands, const VulkanBindings& bindings,
                                 const WarmStart& start) {
-  implementation_->record_next(commands, *buffers.implementation_, start);
+  implementation_->record_next(commands, *bindings.implementation_, start);
 }
 std::size_t VulkanMatcher::device_bytes() const { return implementation_->device_bytes(); }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "pixel_fixture.h"
+#include "vulkan/memory.h"
 #include "vulkan_fixture.h"
 #include "widestereo/matcher.h"
 #include "widestereo/vulkan.h"
@@ -16,7 +17,7 @@ using ::testing::IsEmpty;
 constexpr int side = 65;
 constexpr unsigned char untouched = 0xa5;
 
-/// A storage buffer that the application sees, too.
+/// A buffer that the application sees, too.
 class SharedBuffer {
  public:
   SharedBuffer(const VulkanContext& context, std::size_t bytes) : bytes_(bytes) {
@@ -24,7 +25,7 @@ class SharedBuffer {
     VkBufferCreateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO;
     info.size = bytes;
-    info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+    info.usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT;
     VkBuffer buffer = VK_NULL_HANDLE;
     context.check(vk.vkCreateBuffer(context.device(), &info, nullptr, &buffer), "make a buffer");
     buffer_ = context.own(buffer, vk.vkDestroyBuffer);
@@ -120,16 +121,10 @@ class Commands {
   Handle<VkFence> fence_;
 };
 
-/// Images at odd places of buffers, and all maps of both views in one more.
-class ApplicationBuffers {
+/// All maps of both views at odd places of a buffer.
+class ApplicationMaps {
  public:
-  ApplicationBuffers(const VulkanContext& context, PixelType pixel)
-      : left_(context, image_offset + image_pitch * side + 4),
-        right_(context, image_offset + image_pitch * side + 4),
-        maps_(context, 2 * bytes_of_view),
-        pixel_(pixel) {}
-
-  std::array<VulkanImage, 2> images() const { return {image(left_), image(right_)}; }
+  explicit ApplicationMaps(const VulkanContext& context) : maps_(context, 2 * bytes_of_view) {}
 
   std::array<VulkanViewMaps, 2> maps() const {
     std::array<VulkanViewMaps, 2> both;
@@ -142,14 +137,9 @@ class ApplicationBuffers {
     return both;
   }
 
-  void set(const std::vector<cv::Mat>& images) {
-    const auto copy = [](const cv::Mat& from, const SharedBuffer& to) {
-      from.copyTo(to.mat(from.size(), from.type(), image_offset, image_pitch));
-    };
-    copy(images[0], left_);
-    copy(images[1], right_);
-    maps_.clear();
-  }
+  void clear() { maps_.clear(); }
+  /// Distances of a view.
+  cv::Mat distance(std::size_t view) const { return map(view, 0, CV_32FC1); }
 
   void expect_equal(const StereoResult& expected) const {
     for (std::size_t i = 0; i < 2; ++i) {
@@ -166,8 +156,6 @@ class ApplicationBuffers {
   }
 
  private:
-  static constexpr std::size_t image_offset = 12;
-  static constexpr std::size_t image_pitch = 4 * side + 8;
   static constexpr std::size_t gap = 8;
   static constexpr std::size_t bytes_of_view = (7 * 4 * side + 5 * gap) * side + 64;
 
@@ -179,9 +167,6 @@ class ApplicationBuffers {
     return offset;
   }
 
-  VulkanImage image(const SharedBuffer& buffer) const {
-    return {buffer.get(), image_offset, image_pitch, pixel_};
-  }
   cv::Mat map(std::size_t view, std::size_t i, int type) const {
     return maps_.mat({side, side}, type, offset_of(view, i), pitch_of(i)).clone();
   }
@@ -191,8 +176,99 @@ class ApplicationBuffers {
     EXPECT_EQ(cv::countNonZero(rest != untouched), 0) << view << " " << i;
   }
 
-  SharedBuffer left_, right_, maps_;
+  SharedBuffer maps_;
+};
+
+/// Maps, and images at odd places of two more buffers.
+class ApplicationBuffers : public ApplicationMaps {
+ public:
+  ApplicationBuffers(const VulkanContext& context, PixelType pixel)
+      : ApplicationMaps(context),
+        left_(context, image_offset + image_pitch * side + 4),
+        right_(context, image_offset + image_pitch * side + 4),
+        pixel_(pixel) {}
+
+  std::array<VulkanImage, 2> images() const { return {image(left_), image(right_)}; }
+
+  void set(const std::vector<cv::Mat>& images) {
+    const auto copy = [](const cv::Mat& from, const SharedBuffer& to) {
+      from.copyTo(to.mat(from.size(), from.type(), image_offset, image_pitch));
+    };
+    copy(images[0], left_);
+    copy(images[1], right_);
+    clear();
+  }
+
+ private:
+  static constexpr std::size_t image_offset = 12;
+  static constexpr std::size_t image_pitch = 4 * side + 8;
+
+  VulkanImage image(const SharedBuffer& buffer) const {
+    return {buffer.get(), image_offset, image_pitch, pixel_};
+  }
+
+  SharedBuffer left_, right_;
   PixelType pixel_;
+};
+
+/// An image of the application's, which a copy fills.
+class Texture {
+ public:
+  Texture(const VulkanContext& context, VkFormat format, cv::Size size)
+      : context_(context),
+        image_(make_image(context, format, size, 1,
+                          VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
+                          "a texture")),
+        staging_(context, 16 * size.area()) {
+    VkImageViewCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO;
+    info.image = image_.handle.get();
+    info.viewType = VK_IMAGE_VIEW_TYPE_2D;
+    info.format = format;
+    info.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    VkImageView view = VK_NULL_HANDLE;
+    context.check(context.vk().vkCreateImageView(context.device(), &info, nullptr, &view), "view");
+    view_ = context.own(view, context.vk().vkDestroyImageView);
+  }
+
+  VkImageView view() const { return view_.get(); }
+
+  /// Fills the image when the commands run, and leaves it to shaders.
+  void record_fill(VkCommandBuffer commands, const cv::Mat& texels) const {
+    texels.copyTo(staging_.mat(texels.size(), texels.type(), 0, texels.cols * texels.elemSize()));
+    transition(commands, VK_IMAGE_LAYOUT_UNDEFINED, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+    VkBufferImageCopy region{};
+    region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1};
+    region.imageExtent = {static_cast<std::uint32_t>(texels.cols),
+                          static_cast<std::uint32_t>(texels.rows), 1};
+    context_.vk().vkCmdCopyBufferToImage(commands, staging_.get(), image_.handle.get(),
+                                         VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
+    transition(commands, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+               VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+  }
+
+ private:
+  void transition(VkCommandBuffer commands, VkImageLayout from, VkImageLayout to) const {
+    VkImageMemoryBarrier barrier{};
+    barrier.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER;
+    barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+    barrier.dstAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT | VK_ACCESS_SHADER_READ_BIT;
+    barrier.oldLayout = from;
+    barrier.newLayout = to;
+    barrier.srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED;
+    barrier.image = image_.handle.get();
+    barrier.subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1};
+    constexpr VkPipelineStageFlags stages =
+        VK_PIPELINE_STAGE_TRANSFER_BIT | VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+    context_.vk().vkCmdPipelineBarrier(commands, stages, stages, 0, 0, nullptr, 0, nullptr, 1,
+                                       &barrier);
+  }
+
+  const VulkanContext& context_;
+  LayeredImage image_;
+  Handle<VkImageView> view_;
+  SharedBuffer staging_;
 };
 
 Options small_options(const std::string& preset) {
@@ -216,9 +292,9 @@ TEST_P(VulkanApplication, GetsTheMatchersResultInItsBuffers) {
     const Options options = small_options(preset);
     VulkanMatcher matcher(application.context.handles(), pair.rig, options);
     ApplicationBuffers memory(application.context, GetParam());
-    const VulkanBuffers buffers = matcher.bind(memory.images(), memory.maps());
+    const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
     Commands commands(application.context);
-    matcher.record(commands.get(), buffers);
+    matcher.record(commands.get(), bindings);
     commands.end();
     const StereoResult expected = Matcher(device, pair.rig, options).match(images);
     for (int submission = 0; submission < 2; ++submission) {
@@ -235,6 +311,107 @@ INSTANTIATE_TEST_SUITE_P(Pixels, VulkanApplication,
                          ::testing::Values(PixelType::grey8, PixelType::grey16,
                                            PixelType::intensity),
                          name_of);
+
+/// A format of textures, and the images of the demo in it.
+struct TextureFormat {
+  const char* name;
+  VkFormat format;
+  PixelType pixel;
+  bool colour = false;
+};
+
+class VulkanTextures : public ::testing::TestWithParam<TextureFormat> {};
+
+/// Colours that make up these intensities, with noise in red and blue.
+cv::Mat coloured(const cv::Mat& grey) {
+  cv::Mat red(grey.size(), CV_32F);
+  cv::Mat blue(grey.size(), CV_32F);
+  cv::RNG random(1);
+  random.fill(red, cv::RNG::UNIFORM, 0, 0.4);
+  random.fill(blue, cv::RNG::UNIFORM, 0, 0.4);
+  const cv::Mat green = (grey - 0.299 * red - 0.114 * blue) / 0.587;
+  cv::Mat rgba;
+  cv::merge(std::vector<cv::Mat>{red, green, blue, cv::Mat(grey.size(), CV_32F, 1.0)}, rgba);
+  return rgba;
+}
+
+double share_of_right(const cv::Mat& distance, const cv::Mat& truth) {
+  return cv::countNonZero(cv::abs(distance - truth) <= 0.05 * truth) /
+         static_cast<double>(truth.total());
+}
+
+TEST_P(VulkanTextures, AreMatchedAsTheMatcherDoes) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  const RenderedPair pair = render_demo(side);
+  Options options = Options::preset_named("fast");
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
+  std::vector<cv::Mat> images = device_images_of(pair, GetParam().pixel);
+  if (GetParam().colour) {
+    for (cv::Mat& image : images) image = 0.25 + 0.3 * image;  // green stays within [0, 1]
+  }
+  Device device = Device::open("vulkan:0");
+  const StereoResult expected = Matcher(device, pair.rig, options).match(images);
+
+  const cv::Mat truth = pair.views[0].truth.distance;
+  const double expected_share = share_of_right(expected.views[0].distance, truth);
+  EXPECT_GT(expected_share, 0.3);
+
+  const Texture left(application.context, GetParam().format, {side, side});
+  const Texture right(application.context, GetParam().format, {side, side});
+  const bool colour = GetParam().colour;
+  const VulkanTexture textures[] = {{.view = left.view(), .colour = colour},
+                                    {.view = right.view(), .colour = colour}};
+  ApplicationMaps memory(application.context);
+  const VulkanBindings bindings = matcher.bind(textures, memory.maps());
+  Commands commands(application.context);
+  left.record_fill(commands.get(), colour ? coloured(images[0]) : images[0]);
+  right.record_fill(commands.get(), colour ? coloured(images[1]) : images[1]);
+  matcher.record(commands.get(), bindings);
+  commands.end();
+  for (int submission = 0; submission < 2; ++submission) {
+    memory.clear();
+    commands.run();
+    // Devices may round what they make of whole numbers and colours.
+    if (GetParam().format == VK_FORMAT_R32_SFLOAT) memory.expect_equal(expected);
+    EXPECT_GE(share_of_right(memory.distance(0), truth), expected_share - 0.05);
+  }
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Formats, VulkanTextures,
+    ::testing::Values(TextureFormat{"R32", VK_FORMAT_R32_SFLOAT, PixelType::intensity},
+                      TextureFormat{"R8", VK_FORMAT_R8_UNORM, PixelType::grey8},
+                      TextureFormat{"R16", VK_FORMAT_R16_UNORM, PixelType::grey16},
+                      TextureFormat{"Colour", VK_FORMAT_R32G32B32A32_SFLOAT, PixelType::intensity,
+                                    true}),
+    [](const auto& test) { return test.param.name; });
+
+TEST(VulkanApplications, MaskWhatSmallerTexturesDoNotReach) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  const RenderedPair pair = render_demo(side);
+  VulkanMatcher matcher(application.context.handles(), pair.rig, small_options("fast"));
+  const std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
+  const cv::Rect part(0, 0, side, side - 20);
+  const Texture left(application.context, VK_FORMAT_R8_UNORM, part.size());
+  const Texture right(application.context, VK_FORMAT_R8_UNORM, {side, side});
+  const VulkanTexture textures[] = {{left.view()}, {right.view()}};
+  ApplicationMaps memory(application.context);
+  const VulkanBindings bindings = matcher.bind(textures, memory.maps());
+  Commands commands(application.context);
+  left.record_fill(commands.get(), images[0](part));
+  right.record_fill(commands.get(), images[1]);
+  matcher.record(commands.get(), bindings);
+  commands.end();
+  commands.run();
+  const cv::Mat found = memory.distance(0);
+  EXPECT_EQ(cv::countNonZero(found.rowRange(side - 20, side)), 0);
+  EXPECT_GT(cv::countNonZero(found), side * side / 2);
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
 
 TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
   REQUIRE_VULKAN_OR_SKIP();
@@ -253,9 +430,9 @@ TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
   std::array<VulkanViewMaps, 2> maps;
   maps[0].distance = {distance.get(), 0, 4 * side};
   maps[0].reasons = {reasons.get(), 0, 4 * side};
-  const VulkanBuffers buffers = matcher.bind(memory.images(), maps);
+  const VulkanBindings bindings = matcher.bind(memory.images(), maps);
   Commands commands(application.context);
-  matcher.record(commands.get(), buffers);
+  matcher.record(commands.get(), bindings);
   commands.end();
   memory.set(images);
   commands.run();
@@ -280,21 +457,21 @@ TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
   Matcher expected(device, rig, options);
   VulkanMatcher matcher(application.context.handles(), rig, options);
   ApplicationBuffers memory(application.context, PixelType::grey8);
-  const VulkanBuffers buffers = matcher.bind(memory.images(), memory.maps());
+  const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
   for (int k = 0; k < 3; ++k) {
     const std::vector<cv::Mat> images =
         device_images_of(render_demo_from(pose(k), side), PixelType::grey8);
     memory.set(images);
     Commands commands(application.context);
     if (k == 0) {
-      matcher.record(commands.get(), buffers);
+      matcher.record(commands.get(), bindings);
       commands.end();
       commands.run();
       memory.expect_equal(expected.match(images));
       continue;
     }
     const WarmStart start{.now_from_previous = pose(k).inverse() * pose(k - 1), .frame = k};
-    matcher.record_next(commands.get(), buffers, start);
+    matcher.record_next(commands.get(), bindings, start);
     commands.end();
     commands.run();
     memory.expect_equal(expected.match_next(images, start));
@@ -321,6 +498,9 @@ TEST(VulkanApplications, WhatDoesNotFitIsOneSentence) {
               }),
               HasSubstr("2 views, but 1 image"));
   EXPECT_THAT(error({}, {}), HasSubstr("The image of cam0 has no buffer"));
+  const VulkanTexture none[] = {{}, {}};
+  EXPECT_THAT(error_of([&] { matcher.bind(none, memory.maps()); }),
+              HasSubstr("The image of cam0 has no image view"));
   VulkanImage bad = good[0];
   bad.pitch = 2 * side - 2;
   EXPECT_THAT(error(bad, {}), HasSubstr("The image of cam0 has a pitch of 128 bytes"));
@@ -335,15 +515,15 @@ TEST(VulkanApplications, WhatDoesNotFitIsOneSentence) {
   EXPECT_THAT(error(good[0], maps), HasSubstr("The normal map of cam0"));
 
   Commands commands(application.context);
-  const VulkanBuffers buffers = matcher.bind(good, memory.maps());
-  EXPECT_THAT(error_of([&] { matcher.record_next(commands.get(), buffers); }),
+  const VulkanBindings bindings = matcher.bind(good, memory.maps());
+  EXPECT_THAT(error_of([&] { matcher.record_next(commands.get(), bindings); }),
               HasSubstr("no planes of a previous frame"));
   VulkanMatcher other(application.context.handles(), pair.rig, options);
-  EXPECT_THAT(error_of([&] { other.record(commands.get(), buffers); }),
+  EXPECT_THAT(error_of([&] { other.record(commands.get(), bindings); }),
               HasSubstr("another matcher"));
-  matcher.record(commands.get(), buffers);
+  matcher.record(commands.get(), bindings);
   EXPECT_THAT(
-      error_of([&] { matcher.record_next(commands.get(), buffers, {.hypotheses = {cv::Mat()}}); }),
+      error_of([&] { matcher.record_next(commands.get(), bindings, {.hypotheses = {cv::Mat()}}); }),
       HasSubstr("leave the hypotheses empty"));
 }
 
