@@ -40,6 +40,8 @@ const char* name_of(ws::CalibrationFormat format) {
       return "Basalt";
     case ws::CalibrationFormat::opencv:
       return "OpenCV";
+    case ws::CalibrationFormat::euroc:
+      return "EuRoC";
   }
   return "";
 }

@@ -9,18 +9,19 @@
 namespace widestereo {
 
 /// Calibration file formats, told apart by content, never by file name.
-enum class CalibrationFormat { kalibr, basalt, opencv };
+enum class CalibrationFormat { kalibr, basalt, opencv, euroc };
 
 struct Calibration {
-  Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu or T_imu_cam
+  Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu, T_imu_cam, T_BS
   CalibrationFormat format = CalibrationFormat::kalibr;
 };
 
-/// Reads a Kalibr camchain YAML, a Basalt JSON or an OpenCV FileStorage (YAML, XML or JSON; fisheye
-/// stereo or omnidir) and validates it. Sizes come from the file; an OpenCV file without an image
-/// size takes `image_size` (pixels), and one of another size is refused. The other formats ignore
-/// `image_size`, as each of their cameras has a size of its own. Throws Error naming the file, the
-/// key and the remedy.
+/// Reads a Kalibr camchain YAML, a Basalt JSON, an OpenCV FileStorage (YAML, XML or JSON; fisheye
+/// stereo or omnidir), or EuRoC's sensor.yaml (one camera's, or the folder that has
+/// cam0/sensor.yaml, cam1/sensor.yaml, ... or has them in mav0), and validates it. Sizes come from
+/// the file; an OpenCV file without an image size takes `image_size` (pixels), and one of another
+/// size is refused. The other formats ignore `image_size`, as each of their cameras has a size of
+/// its own. Throws Error naming the file, the key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
 /// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "calibration/colmap_files.h"
+#include "calibration/euroc.h"
 #include "calibration/formats.h"
 #include "geometry/validation.h"
 #include "widestereo/error.h"
@@ -71,7 +72,8 @@ Document load(const std::filesystem::path& path) {
   }
   require_no_part_of_a_model(path);
   if (type != std::filesystem::file_type::regular) {
-    throw Error(path.string() + " is not a file; give a calibration file.");
+    throw Error(path.string() +
+                " is not a file; give a calibration file, or a folder with cam0/sensor.yaml.");
   }
   if (std::filesystem::file_size(path, error) > largest_file) {
     throw Error(path.string() + " is too large for a calibration file (16 MiB).");
@@ -121,7 +123,7 @@ int nesting_of(std::string_view text) {
   return deepest;
 }
 
-/// OpenCV's parsers call themselves at each level, until the stack is full.
+/// The parsers call themselves at each level, until the stack is full.
 void require_shallow(const Document& document) {
   constexpr int deepest = 100;
   if (nesting_of(document.text) <= deepest) return;
@@ -155,12 +157,12 @@ CalibrationFormat format_of(const Document& document) {
   }
   refuse_polynomials(document);
   if (document.text[first] == '{') return CalibrationFormat::basalt;
-  if (contains(document, "camera_model") || contains(document, "cam0:")) {
-    return CalibrationFormat::kalibr;
-  }
+  if (contains(document, "cam0:")) return CalibrationFormat::kalibr;
+  if (contains(document, "T_BS")) return CalibrationFormat::euroc;
+  if (contains(document, "camera_model")) return CalibrationFormat::kalibr;
   document.fail(
       "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
-      "(JSON) or an OpenCV FileStorage.");
+      "(JSON), an OpenCV FileStorage or EuRoC's sensor.yaml.");
 }
 
 }  // namespace
@@ -168,19 +170,25 @@ CalibrationFormat format_of(const Document& document) {
 
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size) {
   using namespace calibration;
-  const Document document = load(path);
-  require_shallow(document);
   Calibration result;
-  result.format = format_of(document);
+  const std::vector<std::filesystem::path> sensor_files = euroc_files(path);
+  std::vector<Document> documents;
+  if (sensor_files.empty()) documents.push_back(load(path));
+  for (const std::filesystem::path& file : sensor_files) documents.push_back(load(file));
+  for (const Document& document : documents) require_shallow(document);
+  result.format = sensor_files.empty() ? format_of(documents[0]) : CalibrationFormat::euroc;
   switch (result.format) {
     case CalibrationFormat::kalibr:
-      result.rig = read_kalibr(document);
+      result.rig = read_kalibr(documents[0]);
       break;
     case CalibrationFormat::basalt:
-      result.rig = read_basalt(document);
+      result.rig = read_basalt(documents[0]);
       break;
     case CalibrationFormat::opencv:
-      result.rig = read_opencv(document, image_size);
+      result.rig = read_opencv(documents[0], image_size);
+      break;
+    case CalibrationFormat::euroc:
+      result.rig = read_euroc(documents);
       break;
   }
   validate(result.rig, path.string());

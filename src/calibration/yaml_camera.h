@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// Cameras in YAML, with the keys that Kalibr and EuRoC's data sets share.
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Geometry>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "calibration/formats.h"
+
+namespace widestereo::calibration {
+
+/// Hands the root of a document to `read`. Throws Error for what is no YAML, holds no keys or one
+/// of them twice.
+void read_yaml(const Document& document, const std::function<void(const YAML::Node& root)>& read);
+
+/// What one camera's keys say, with messages that name file and camera.
+class YamlCamera {
+ public:
+  /// The document must outlive it. Throws Error where the node holds no keys or one twice.
+  YamlCamera(const Document& document, const std::string& name, const YAML::Node& node);
+
+  /// The camera without its pose.
+  View view() const;
+  bool has(const char* key) const;
+  Eigen::Isometry3d motion(const char* key) const;
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const;
+  std::string text(const char* key, const char* otherwise = nullptr) const;
+  std::vector<double> numbers(const YAML::Node& list, const char* key) const;
+  /// Surplus numbers may only be zeros: what another one means would be lost.
+  std::vector<double> numbers(const char* key, std::size_t count) const;
+  double number(const YAML::Node& node, const char* key) const;
+  void set_projection(Camera& camera) const;
+  void set_distortion(Camera& camera) const;
+  void set_resolution(Camera& camera) const;
+
+  const Document& document_;
+  std::string name_;
+  YAML::Node node_;
+};
+
+}  // namespace widestereo::calibration
