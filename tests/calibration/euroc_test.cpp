@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <string>
 
+#include "damaged_texts.h"
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
@@ -118,6 +119,8 @@ TEST(EuRoC, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(error_of_text(good.substr(0, good.find("0.0, 0.0, 0.0, 1.0"))),
               HasSubstr("not valid YAML"));
   EXPECT_THAT(error_of_text(""), HasSubstr("cam0/sensor.yaml"));
+
+  EXPECT_GT(test::times_refused(good, error_of_text), 100);
 
   write_set(folder, "late/", 1);
   EXPECT_THAT(error(folder / "late"), HasSubstr("number the cameras from cam0"));

@@ -3,9 +3,9 @@
 
 #include <cmath>
 #include <opencv2/core.hpp>
-#include <random>
 #include <string>
 
+#include "damaged_texts.h"
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/image_io.h"
@@ -133,19 +133,7 @@ TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
 /// Whatever bytes come, there is a model or an Error.
 TEST_F(Nerfstudio, DamagedFilesNeverCrash) {
   const std::string text = file(fisheye, frame("a.png") + ", " + frame("b.png"));
-  std::mt19937 random(5);
-  int refused = 0;
-  for (std::size_t size = 0; size < text.size(); size += 5) {
-    refused += !error(text.substr(0, size)).empty();
-  }
-  for (int round = 0; round < 300; ++round) {
-    std::string damaged = text;
-    for (int i = 0; i < 3; ++i) {
-      damaged[random() % damaged.size()] = static_cast<char>(random() % 256);
-    }
-    refused += !error(damaged).empty();
-  }
-  EXPECT_GT(refused, 200);
+  EXPECT_GT(test::times_refused(text, [&](const std::string& left) { return error(left); }), 200);
 }
 
 }  // namespace
