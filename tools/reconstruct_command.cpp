@@ -58,20 +58,36 @@ std::vector<Images> groups_of(const PosedImages& images, const ReconstructArgume
   return groups;
 }
 
-/// All that decides the results but the images, cameras and poses, which each result names.
-Json settings_of(const ReconstructArguments& a, const ws::DeviceInfo& device) {
+/// Of each group: its images' points say how far the scene reaches where the settings do not.
+std::vector<ws::Options> options_of(const std::vector<Images>& groups, const PosedImages& images,
+                                    const ReconstructArguments& arguments) {
+  std::vector<ws::Options> options;
+  for (const Images& group : groups) {
+    const ws::CalibratedImages seen{
+        .rig = {}, .distances = images.distances(group), .in_metres = images.in_metres};
+    options.push_back(
+        with_range(arguments.settings, seen, arguments.images.rig.calibration).options());
+  }
+  return options;
+}
+
+/// All that decides the results but the images, cameras and poses, which each result names. The
+/// range has the ends that were given: the others are each group's own.
+Json settings_of(const ReconstructArguments& a, const ws::Options& of_group,
+                 const ws::DeviceInfo& device) {
+  Json options = Json::parse(ws::to_json(of_group));
+  if (!a.settings.min_distance) options.erase("min_distance");
+  if (!a.settings.max_distance) options.erase("max_distance");
   return {{"program", "widestereo " WIDESTEREO_VERSION},
           {"images", absolute_path(a.images.images)},
           {"calibration", absolute_path(a.images.rig.calibration)},
           {"mask", absolute_paths(a.images.rig.masks)},
           {"masks", absolute_path(a.images.masks)},
           {"sources", a.sources},
-          {"min_distance_given", a.settings.min_distance.has_value()},
-          {"max_distance_given", a.settings.max_distance.has_value()},
           {"clouds", !a.format.no_cloud},
           {"pictures", !a.format.no_pictures},
           {"device", device.name},
-          {"options", Json::parse(ws::to_json(a.settings.options()))}};
+          {"options", options}};
 }
 
 /// Matches images group by group and joins their points.
@@ -81,11 +97,12 @@ class Reconstruction {
       : arguments_(arguments),
         images_(arguments.images.read(arguments.settings)),
         groups_(groups_of(images_, arguments)),
+        options_(options_of(groups_, images_, arguments)),
         device_(open_device(arguments.settings)),
         folders_(
             arguments.output,
             {.name = "reconstruction", .results = "images", .texts = {}, .numbers = {"accepted"}},
-            settings_of(arguments, device_.info()), arguments.overwrite) {}
+            settings_of(arguments, options_.front(), device_.info()), arguments.overwrite) {}
 
   void run() {
     const auto alone = std::count_if(groups_.begin(), groups_.end(), is_alone);
@@ -145,11 +162,7 @@ class Reconstruction {
       rig.views.push_back(images_.views[image]);
       pixels.push_back(images_.read(image));
     }
-    const ws::CalibratedImages calibrated{
-        .rig = rig, .distances = images_.distances(group), .in_metres = images_.in_metres};
-    const MatchSettings settings =
-        with_range(arguments_.settings, calibrated, arguments_.images.rig.calibration);
-    MatchingRun run{.options = settings.options(), .device = device_.info(), .result = {}};
+    MatchingRun run{.options = options_[number], .device = device_.info(), .result = {}};
     ws::Matcher matcher(device_, rig, run.options);
     run.result = matcher.match(pixels, bar.part(number, count));
     require_no_validation_messages(device_);
@@ -245,6 +258,7 @@ class Reconstruction {
   const ReconstructArguments& arguments_;
   PosedImages images_;
   std::vector<Images> groups_;
+  std::vector<ws::Options> options_;  // of the groups
   ws::Device device_;
   ResultFolders folders_;
   std::vector<bool> matched_;

@@ -135,12 +135,15 @@ class ReconstructCommand : public ColmapCommand {
     std::filesystem::copy_file(file("left.png"), folder_ / "images/left.png");
     std::filesystem::copy_file(file("right.png"), folder_ / "images/right/1.png");
     std::filesystem::copy_file(file("left.png"), folder_ / "images/away.png");
-    rename_in_model("right.png", "right/1.png");
+    replace_in_model("model/images.txt", "right.png", "right/1.png");
   }
-  void rename_in_model(const std::string& from, const std::string& to) {
-    std::string text = bytes_of("model/images.txt");
-    text.replace(text.find(from), from.size(), to);
-    folder_.write("model/images.txt", text);
+  void replace_in_model(const std::string& name, const std::string& from, const std::string& to) {
+    std::string text = bytes_of(name);
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {
+      text.replace(at, from.size(), to);
+      at += to.size();
+    }
+    folder_.write(name, text);
   }
   std::string bytes_of(const std::string& name) const {
     std::ifstream stream(folder_ / name, std::ios::binary);
@@ -203,7 +206,7 @@ TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
 TEST_F(ReconstructCommand, ImagesThatMovedAreMatchedAgain) {
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   const std::string before = bytes_of("out/left.png/distance0.tiff");
-  rename_in_model("-0.1 0 0", "-0.2 0 0");
+  replace_in_model("model/images.txt", "-0.1 0 0", "-0.2 0 0");
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   EXPECT_TRUE(bytes_of("out/left.png/distance0.tiff") != before);
   EXPECT_EQ(record()["images"].size(), 2U);
@@ -229,6 +232,7 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   const std::string mask = " --mask " + file("left.png");
   expect_error(reconstruct() + mask + mask, "--mask is for all images");
   EXPECT_NE(run(reconstruct() + "--sources 0").exit_code, 0);
+  expect_error(reconstruct() + "--min-distance 1000", "The distance range from 1000");
   std::filesystem::remove(folder_ / "images/away.png");
   expect_error(reconstruct(), "away.png is missing");
   cv::imwrite(file("images/away.png"), cv::Mat(9, 9, CV_8UC1, cv::Scalar(0)));
@@ -240,6 +244,18 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   expect_error("reconstruct " + file("images") + " -c " + file("same.yaml") + " -o " + file("out"),
                "same.yaml is no COLMAP model");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+}
+
+TEST_F(ReconstructCommand, OneEndOfTheRangeWillDo) {
+  // In units of a centimetre.
+  replace_in_model("model/images.txt", "-0.1 0 0", "-10 0 0");
+  replace_in_model("model/points3D.txt", "0 0 4", "0 0 400");
+  const Outcome outcome = run(reconstruct() + "--min-distance 60");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json options = record_of("out/left.png")["options"];
+  EXPECT_EQ(options["min_distance"], 60);
+  EXPECT_NEAR(options["max_distance"], 1.25 * std::hypot(400, 10), 1e-9);
+  EXPECT_FALSE(record()["settings"]["options"].contains("max_distance"));
 }
 
 /// Where no points tell which images see the same, poses and the range do.
