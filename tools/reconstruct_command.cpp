@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "input_record.h"
 #include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
@@ -18,7 +19,6 @@
 #include "progress_bar.h"
 #include "result_folder.h"
 #include "result_folders.h"
-#include "view_record.h"
 #include "widestereo/error.h"
 #include "widestereo/fusion.h"
 #include "widestereo/image_io.h"
@@ -122,10 +122,13 @@ class Reconstruction {
  private:
   bool is_matched(std::size_t image) const { return matched_[image]; }
 
-  /// The views that are matched with each other in a group.
+  /// The views that are matched with each other in a group, and their images.
   Json views_of(const Images& group) const {
     Json views = Json::array();
-    for (const std::size_t image : group) views.push_back(to_json(images_.views[image]));
+    for (const std::size_t image : group) {
+      views.push_back(to_json(images_.views[image]));
+      views.back()["file"] = file_record(images_.files[image]);
+    }
     return views;
   }
 

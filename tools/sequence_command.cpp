@@ -12,6 +12,7 @@
 
 #include "commands.h"
 #include "frame_settings.h"
+#include "input_record.h"
 #include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
@@ -22,7 +23,6 @@
 #include "rig_settings.h"
 #include "sequence_folder.h"
 #include "sharpness_settings.h"
-#include "view_record.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/motion.h"
@@ -56,11 +56,6 @@ struct Selection {
   ws::Rig rig;
   std::vector<double> blurs;  ///< of each view's images before they are matched, pixels
   RigPoses motion;            ///< no poses where they are not known
-  std::vector<std::string> names() const {
-    std::vector<std::string> names;
-    for (const ws::SequenceFrame& frame : frames) names.push_back(frame.name);
-    return names;
-  }
 };
 
 std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
@@ -151,7 +146,9 @@ class SequenceRun {
         bar_("Matching on " + device_.info().name) {}
 
   void run() {
-    const std::size_t finished = folder_.finished(selection_.names(), poses());
+    std::vector<Json> wanted;
+    for (std::size_t i = 0; i < selection_.frames.size(); ++i) wanted.push_back(input_of(i));
+    const std::size_t finished = folder_.finished(wanted);
     remaining_ = selection_.frames.size() - finished;
     if (remaining_ == 0) return;
     ws::Matcher matcher(device_, selection_.rig, options_);
@@ -189,13 +186,13 @@ class SequenceRun {
     for (const Json& record : folder_.frames()) note_cold(record);
   }
 
-  /// Of each frame, null where it is not known.
-  std::vector<Json> poses() const {
-    std::vector<Json> poses(selection_.frames.size());
-    for (std::size_t i = 0; i < selection_.motion.poses.size(); ++i) {
-      poses[i] = to_json(selection_.motion.poses[i]);
-    }
-    return poses;
+  /// What a frame's record says of what it comes of.
+  Json input_of(std::size_t index) const {
+    const ws::SequenceFrame& frame = selection_.frames[index];
+    Json input = {{"name", frame.name}};
+    for (const fs::path& image : frame.images) input["files"].push_back(file_record(image));
+    if (arguments_.poses.given()) input["pose"] = to_json(selection_.motion.poses[index]);
+    return input;
   }
 
   void note_cold(const Json& record) {
@@ -266,15 +263,14 @@ class SequenceRun {
     const ws::SequenceFrame& source = selection_.frames[index];
     const ws::StereoResult& result = frame.run.result;
     const Quality quality = quality_of(result);
-    Json record = {{"name", source.name},
-                   {"start", frame.start},
+    Json record = input_of(index);
+    record.update({{"start", frame.start},
                    {"motion", frame.motion},
                    {"milliseconds", result.milliseconds},
                    {"motion_milliseconds", frame.motion_milliseconds},
                    {"patch_samples", result.samples},
                    {"accepted", quality.accepted},
-                   {"mean_cost", quality.mean_cost}};
-    if (arguments_.poses.given()) record["pose"] = to_json(selection_.motion.poses[index]);
+                   {"mean_cost", quality.mean_cost}});
     note_cold(record);
     folder_.add(source.name, result.views, [&](const fs::path& folder) {
       FolderContents contents{

@@ -27,6 +27,13 @@ void write_planes(const fs::path& folder, const std::vector<ws::ViewResult>& vie
   }
 }
 
+bool has_values(const Json& record, const Json& values) {
+  for (const auto& [key, value] : values.items()) {
+    if (!record.contains(key) || record[key] != value) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 SequenceFolder::SequenceFolder(fs::path folder, const Json& settings, bool overwrite)
@@ -38,13 +45,11 @@ SequenceFolder::SequenceFolder(fs::path folder, const Json& settings, bool overw
                             "mean_cost"}},
                settings, overwrite) {}
 
-std::size_t SequenceFolder::finished(const std::vector<std::string>& names,
-                                     const std::vector<Json>& poses) {
+std::size_t SequenceFolder::finished(const std::vector<Json>& wanted) {
   Json kept = Json::array();
-  for (std::size_t i = 0; i < names.size() && i < frames().size(); ++i) {
+  for (std::size_t i = 0; i < wanted.size() && i < frames().size(); ++i) {
     const Json& frame = frames()[i];
-    if (frame["name"] != names[i] || frame.value("pose", Json()) != poses[i]) break;
-    if (!results_.is_there(frame)) break;
+    if (!has_values(frame, wanted[i]) || !results_.is_there(frame)) break;
     kept.push_back(frame);
   }
   results_.keep(kept);

@@ -19,9 +19,9 @@ class SequenceFolder {
   /// As ResultFolders.
   SequenceFolder(std::filesystem::path folder, const Json& settings, bool overwrite);
 
-  /// How many of these frames, from the first on, are there already, with the same pose (null where
-  /// none is known). Forgets all others.
-  std::size_t finished(const std::vector<std::string>& names, const std::vector<Json>& poses);
+  /// How many frames, from the first on, are there already, with these values in their records.
+  /// Forgets all others.
+  std::size_t finished(const std::vector<Json>& wanted);
   /// Records of the finished frames, in order.
   const Json& frames() const { return results_.results(); }
   const Json& record() const { return results_.record(); }

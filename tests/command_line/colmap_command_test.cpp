@@ -212,6 +212,16 @@ TEST_F(ReconstructCommand, ImagesThatMovedAreMatchedAgain) {
   EXPECT_EQ(record()["images"].size(), 2U);
 }
 
+TEST_F(ReconstructCommand, ReplacedImagesAreMatchedAgain) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  const std::string before = bytes_of("out/left.png/distance0.tiff");
+  cv::Mat image = cv::imread(file("images/left.png"), cv::IMREAD_UNCHANGED);
+  cv::flip(image, image, 1);
+  cv::imwrite(file("images/left.png"), image);
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  EXPECT_FALSE(bytes_of("out/left.png/distance0.tiff") == before);
+}
+
 TEST_F(ReconstructCommand, MasksAreOfEachImage) {
   std::filesystem::create_directories(folder_ / "masks/right");
   cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));

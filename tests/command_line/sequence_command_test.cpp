@@ -115,6 +115,21 @@ TEST_F(SequenceCommand, ResumesWithTheSameBits) {
   EXPECT_TRUE(fs::exists(folder_ / "parts/001/result.json"));
 }
 
+TEST_F(SequenceCommand, ReplacedImagesAreMatchedAgain) {
+  ASSERT_EQ(run(sequence()).exit_code, 0);
+  const std::string first = bytes_of(folder_ / "out/000/result.json");
+  const std::string second = bytes_of(folder_ / "out/001/distance0.tiff");
+  const fs::path image = folder_ / "data/cam0/001.png";
+  cv::Mat changed = cv::imread(image.string(), cv::IMREAD_UNCHANGED);
+  cv::flip(changed, changed, 1);
+  cv::imwrite(image.string(), changed);
+  const Outcome outcome = run(sequence());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(bytes_of(folder_ / "out/000/result.json") == first);
+  EXPECT_FALSE(bytes_of(folder_ / "out/001/distance0.tiff") == second);
+  EXPECT_NE(outcome.output.find("(3 of 3)"), std::string::npos) << outcome.output;
+}
+
 TEST_F(SequenceCommand, OtherSettingsNeedAnotherFolderOrOverwriting) {
   ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
   const Outcome other = run(sequence() + "--seed 5");

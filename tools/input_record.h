@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// What records say of a calibrated view, by which a run is taken up again.
+// What records say of a calibrated view and its image, by which a run is taken up again.
 #pragma once
 
 #include <Eigen/Geometry>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "widestereo/rig.h"
@@ -10,3 +11,5 @@
 /// The upper three rows, row by row.
 nlohmann::ordered_json to_json(const Eigen::Isometry3d& pose);
 nlohmann::ordered_json to_json(const widestereo::View& view);
+/// What tells a file from another one that takes its place: its size and when it was last changed.
+nlohmann::ordered_json file_record(const std::filesystem::path& file);

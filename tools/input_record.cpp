@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-#include "view_record.h"
+#include "input_record.h"
 
+#include <chrono>
 #include <opencv2/core.hpp>
+#include <system_error>
 
 namespace ws = widestereo;
 using Json = nlohmann::ordered_json;
@@ -25,4 +27,14 @@ Json to_json(const ws::View& view) {
           {"max_theta", c.max_theta},
           {"world_from_camera", to_json(view.world_from_camera)},
           {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)}};
+}
+
+Json file_record(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+  const auto changed = std::filesystem::last_write_time(file, error).time_since_epoch();
+  // Who reads the image says what is wrong with it.
+  if (error) return nullptr;
+  return {{"bytes", bytes},
+          {"changed", std::chrono::duration_cast<std::chrono::nanoseconds>(changed).count()}};
 }
