@@ -11,6 +11,7 @@
 #include "result_folder.h"
 #include "rig_settings.h"
 #include "sharpness_settings.h"
+#include "size_settings.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -27,6 +28,7 @@ struct DepthArguments {
   std::string output;
   RigSettings rig;
   PoseSettings poses;
+  SizeSettings size;
   SharpnessSettings sharpness;
   MatchSettings settings;
   FolderFormat format;
@@ -66,7 +68,9 @@ void run_depth(const DepthArguments& arguments) {
       calibrated_images(arguments.rig, arguments.poses, files, images.front().size(), model);
   const ws::Rig& rig = calibrated.rig;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    ws::require_calibrated_size(images[i], rig.views[i], files[i]);
+    ws::View& view = calibrated.rig.views[i];
+    images[i] = arguments.size.reduced(images[i], view, files[i]);
+    view = arguments.size.reduced(view);
   }
   arguments.rig.leave_out_dark_rims(calibrated.rig, images);
   const MatchSettings settings =
@@ -102,6 +106,7 @@ void add_depth_command(CLI::App& app) {
                        std::to_string(default_sources) +
                        "; with the three levels of quality and fast 4 at most)")
       ->check(CLI::Range(1, most_images - 1));
+  arguments->size.add_to(*command);
   arguments->sharpness.add_to(*command);
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <opencv2/core.hpp>
 #include <system_error>
+#include <utility>
 
 namespace ws = widestereo;
 using Json = nlohmann::ordered_json;
@@ -16,14 +17,26 @@ Json to_json(const Eigen::Isometry3d& pose) {
   return rows;
 }
 
+Json intrinsics_of(const ws::Camera& camera) {
+  Json intrinsics = {{"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
+  constexpr std::pair<const char*, double ws::Camera::*> others[] = {
+      {"skew", &ws::Camera::skew}, {"xi", &ws::Camera::xi},       {"alpha", &ws::Camera::alpha},
+      {"beta", &ws::Camera::beta}, {"omega", &ws::Camera::omega}, {"k1", &ws::Camera::k1},
+      {"k2", &ws::Camera::k2},     {"k3", &ws::Camera::k3},       {"k4", &ws::Camera::k4},
+      {"p1", &ws::Camera::p1},     {"p2", &ws::Camera::p2}};
+  const ws::Camera without;
+  for (const auto& [name, member] : others) {
+    if (camera.*member != without.*member) intrinsics[name] = camera.*member;
+  }
+  return intrinsics;
+}
+
 Json to_json(const ws::View& view) {
   const ws::Camera& c = view.camera;
   return {{"name", view.name},
           {"model", to_string(c.model)},
           {"size", {c.width, c.height}},
-          {"intrinsics",
-           {c.fx, c.fy, c.cx, c.cy, c.skew, c.xi, c.alpha, c.beta, c.omega, c.k1, c.k2, c.k3, c.k4,
-            c.p1, c.p2}},
+          {"intrinsics", intrinsics_of(c)},
           {"max_theta", c.max_theta},
           {"world_from_camera", to_json(view.world_from_camera)},
           {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)}};

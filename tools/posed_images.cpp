@@ -28,9 +28,7 @@ std::vector<Eigen::Vector3d> centres_of(const std::vector<ws::View>& views) {
 }  // namespace
 
 cv::Mat PosedImages::read(std::size_t image) const {
-  cv::Mat pixels = ws::read_image(files[image]);
-  ws::require_calibrated_size(pixels, views[image], files[image].string());
-  return pixels;
+  return size.reduced(ws::read_image(files[image]), calibrated[image], files[image].string());
 }
 
 void PosedImageSettings::add_to(CLI::App& command) {
@@ -48,11 +46,14 @@ void PosedImageSettings::add_to(CLI::App& command) {
       "the pixel");
   poses.add_to(command, "what is not a COLMAP model or transforms.json needs it", "Data sets");
   frames.add_to(command);
+  size.add_to(command);
 }
 
 PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   PosedImages posed = ws::is_sfm_model(rig.calibration) ? of_model() : of_trajectory();
   apply_masks(posed);
+  posed.size = size;
+  for (const ws::View& view : posed.calibrated) posed.views.push_back(size.reduced(view));
   if (masks.empty()) leave_out_dark_rims(posed);
   if (posed.selection == nullptr) {
     const ws::CalibratedImages without_points{.rig = {}, .in_metres = posed.in_metres};
@@ -89,7 +90,7 @@ PosedImages PosedImageSettings::of_model() const {
     }
     ws::Rig one = model->calibrated({i}).rig;
     rig.limit_fields_of_view(one);
-    posed.views.push_back(one.views.front());
+    posed.calibrated.push_back(one.views.front());
     all.push_back(i);
   }
   if (model->has_points()) posed.selection = {model, &model->selection()};
@@ -109,14 +110,14 @@ PosedImages PosedImageSettings::of_trajectory() const {
   }
   const int first = rig.views.empty() ? 0 : rig.views.front();
   const ws::SequenceFrame example = ws::read_sequence(images, {first}).front();
-  const cv::Size size = ws::read_image(example.images.front()).size();
+  const cv::Size of_image = ws::read_image(example.images.front()).size();
   std::vector<int> cameras = rig.views;
   if (cameras.empty()) {
-    cameras.resize(ws::read_calibration(rig.calibration, size).rig.views.size());
+    cameras.resize(ws::read_calibration(rig.calibration, of_image).rig.views.size());
     std::iota(cameras.begin(), cameras.end(), 0);
   }
   const ChosenFrames chosen = frames.choose(images, cameras);
-  const ws::Rig of_frame = rig.rig_for_images(cameras.size(), size);
+  const ws::Rig of_frame = rig.rig_for_images(cameras.size(), of_image);
   const std::vector<Eigen::Isometry3d> world_from_rig =
       poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses;
   PosedImages posed;
@@ -128,7 +129,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
       view.name = frame.name + "/" + view.name;
       view.world_from_camera = world_from_rig[k] * view.world_from_camera;
       view.world_from_camera.translation() -= posed.origin;
-      posed.views.push_back(std::move(view));
+      posed.calibrated.push_back(std::move(view));
       posed.files.push_back(frame.images[i]);
     }
   }
@@ -141,7 +142,7 @@ void PosedImageSettings::apply_masks(PosedImages& posed) const {
   if (!fs::is_directory(masks)) {
     throw ws::Error(masks + " is no folder; give the one that holds NAME.png for the image NAME.");
   }
-  for (ws::View& view : posed.views) {
+  for (ws::View& view : posed.calibrated) {
     const fs::path mask = fs::path(masks) / (view.name + ".png");
     if (!fs::exists(mask)) continue;
     view.mask = ws::read_mask(mask);

@@ -16,6 +16,7 @@
 #include "match_settings.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
+#include "size_settings.h"
 #include "widestereo/sfm_model.h"
 #include "widestereo/view_selection.h"
 
@@ -23,7 +24,9 @@
 using Images = std::vector<std::size_t>;
 
 struct PosedImages {
-  std::vector<widestereo::View> views;  ///< named as their results are; with masks
+  std::vector<widestereo::View> calibrated;  ///< for the files, named as their results are
+  std::vector<widestereo::View> views;       ///< the same as they are matched; with masks
+  SizeSettings size;
   std::vector<std::filesystem::path> files;
   std::shared_ptr<const widestereo::ViewSelection> selection;
   /// That some images have by what is known of the scene; nothing for options to be taken.
@@ -32,7 +35,7 @@ struct PosedImages {
   /// Of the frame of the views, in that of the trajectory, metres: coordinates stay small.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 
-  /// Throws Error unless it has the calibrated size.
+  /// As it is matched. Throws Error unless the file has the calibrated size.
   cv::Mat read(std::size_t image) const;
 };
 
@@ -42,6 +45,7 @@ struct PosedImageSettings {
   std::string masks;  ///< folder with NAME.png for the image NAME
   PoseSettings poses;
   FrameSettings frames;
+  SizeSettings size;
 
   /// Adds all these options.
   void add_to(CLI::App& command);

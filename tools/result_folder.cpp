@@ -13,6 +13,7 @@
 #include <string>
 #include <system_error>
 
+#include "input_record.h"
 #include "json_text.h"
 #include "option_checks.h"
 #include "widestereo/error.h"
@@ -82,6 +83,8 @@ class ViewWriter {
             {"width", view_.camera.width},
             {"height", view_.camera.height},
             {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
+            {"intrinsics", intrinsics_of(view_.camera)},
+            {"world_from_camera", to_json(view_.world_from_camera)},
             {"blur_pixels", contents_.blurs.empty() ? 0 : contents_.blurs[index_]},
             {"accepted", accepted_share(result_)},
             {"filled", share_of_usable(result_, (result_.reasons & ws::reason_filled) != 0)},
@@ -198,6 +201,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
        "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle; 1024 = filled all the "
        "same; 0 = accepted; 16 bit"},
       {"cloud", "world frame, accepted pixels"},
+      {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},
       {"pixels", "integer coordinates are pixel centres"}};
   return record;
 }

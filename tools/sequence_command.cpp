@@ -23,6 +23,7 @@
 #include "rig_settings.h"
 #include "sequence_folder.h"
 #include "sharpness_settings.h"
+#include "size_settings.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/motion.h"
@@ -44,6 +45,7 @@ struct SequenceArguments {
   bool no_warm_start = false;
   bool overwrite = false;
   RigSettings rig;
+  SizeSettings size;
   SharpnessSettings sharpness;
   MatchSettings settings;
   FolderFormat format;
@@ -53,14 +55,20 @@ struct SequenceArguments {
 /// Frames to match, with the rig and its poses where they are known.
 struct Selection {
   std::vector<ws::SequenceFrame> frames;
-  ws::Rig rig;
+  ws::Rig calibrated;         ///< for the images as they are
+  ws::Rig rig;                ///< as they are matched
   std::vector<double> blurs;  ///< of each view's images before they are matched, pixels
   RigPoses motion;            ///< no poses where they are not known
 };
 
-std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
+/// As they are matched; throws Error unless they have the calibrated sizes.
+std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame, const ws::Rig& calibrated,
+                                 const SizeSettings& size) {
   std::vector<cv::Mat> images;
-  for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
+  for (std::size_t i = 0; i < frame.images.size(); ++i) {
+    const std::string file = frame.images[i].string();
+    images.push_back(size.reduced(ws::read_image(file), calibrated.views[i], file));
+  }
   return images;
 }
 
@@ -70,8 +78,12 @@ Selection select_frames(const SequenceArguments& a) {
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
-  const std::vector<cv::Mat> first = read_images(selection.frames.front());
-  selection.rig = a.rig.rig_for_images(cameras.size(), first.front().size());
+  const ws::SequenceFrame& start = selection.frames.front();
+  selection.calibrated =
+      a.rig.rig_for_images(cameras.size(), ws::read_image(start.images.front()).size());
+  selection.rig = selection.calibrated;
+  for (ws::View& view : selection.rig.views) view = a.size.reduced(view);
+  const std::vector<cv::Mat> first = read_images(start, selection.calibrated, a.size);
   // The first frame alone decides, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);
   selection.blurs = a.sharpness.blurs(selection.rig, first);
@@ -79,13 +91,6 @@ Selection select_frames(const SequenceArguments& a) {
     selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen);
   }
   return selection;
-}
-
-void require_sizes(const ws::SequenceFrame& frame, const std::vector<cv::Mat>& images,
-                   const ws::Rig& rig) {
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    ws::require_calibrated_size(images[i], rig.views[i], frame.images[i].string());
-  }
 }
 
 /// All that decides the results of a frame.
@@ -175,8 +180,7 @@ class SequenceRun {
 
   void take_up(std::size_t last) {
     const ws::SequenceFrame& frame = selection_.frames[last];
-    const std::vector<cv::Mat> images = read_images(frame);
-    require_sizes(frame, images, selection_.rig);
+    const std::vector<cv::Mat> images = read_images(frame, selection_.calibrated, arguments_.size);
     previous_ = {blurred(images, selection_.blurs), folder_.planes(frame.name, selection_.rig)};
     if (previous_.views.empty() && !arguments_.no_warm_start) {
       std::fprintf(stderr,
@@ -202,8 +206,7 @@ class SequenceRun {
 
   void match(ws::Matcher& matcher, std::size_t index) {
     const ws::SequenceFrame& source = selection_.frames[index];
-    const std::vector<cv::Mat> taken = read_images(source);
-    require_sizes(source, taken, selection_.rig);
+    const std::vector<cv::Mat> taken = read_images(source, selection_.calibrated, arguments_.size);
     const std::vector<cv::Mat> images = blurred(taken, selection_.blurs);
     const ws::Matcher::Progress progress = bar_.part(matched_, remaining_);
     Frame frame;
@@ -344,6 +347,7 @@ void add_sequence_command(CLI::App& app) {
   auto a = std::make_shared<SequenceArguments>();
   command->add_option("dataset", a->dataset, FrameSettings::layouts)->required();
   a->rig.add_to(*command);
+  a->size.add_to(*command);
   a->sharpness.add_to(*command);
   command
       ->add_option("-o,--output", a->output,

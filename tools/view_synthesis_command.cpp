@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
+#include "size_settings.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/view_synthesis.h"
@@ -19,18 +20,20 @@ struct SynthesisArguments {
   std::string picture;
   RigSettings rig;
   PoseSettings poses;
+  SizeSettings size;
   bool as_json = false;
 };
 
 void run_synthesis(const SynthesisArguments& a) {
-  const cv::Mat image = ws::read_grey_levels(a.image);
-  const cv::Mat other = ws::read_grey_levels(a.other);
+  cv::Mat image = ws::read_grey_levels(a.image);
+  cv::Mat other = ws::read_grey_levels(a.other);
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
   const cv::Mat distance = ws::read_map(a.distance);
-  ws::require_calibrated_size(image, rig.views[0], a.image);
-  const ws::SynthesisedView synthesised =
-      ws::synthesise_view(distance, rig.views[0], other, rig.views[1]);
+  image = a.size.reduced(image, rig.views[0], a.image);
+  other = a.size.reduced(other, rig.views[1], a.other);
+  const ws::SynthesisedView synthesised = ws::synthesise_view(
+      distance, a.size.reduced(rig.views[0]), other, a.size.reduced(rig.views[1]));
   const ws::SynthesisScores scores = ws::synthesis_scores(distance, image, synthesised);
   if (scores.windows == 0) {
     throw ws::Error("There is no textured window to score in " + a.image + " that " + a.other +
@@ -57,6 +60,7 @@ void add_view_synthesis_command(CLI::App& app) {
   command->add_option("other", a->other, "Another image, best one that took no part in matching")
       ->required();
   add_image_options(*command, a->rig, a->poses);
+  a->size.add_to(*command);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_synthesis(*a); });

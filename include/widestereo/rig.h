@@ -43,6 +43,11 @@ inline bool has_baseline(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return (a - b).norm() > least;
 }
 
+/// The view of an image that is scaled to another size by its corners. A pixel is excluded where
+/// the mask excludes any that it covers. Throws Error where either size has no pixel or the mask
+/// does not fit.
+View resized(const View& view, int width, int height);
+
 /// Whether the view's mask excludes the pixel nearest to a position, or what lies outside the mask.
 bool is_masked(const View& view, const Eigen::Vector2d& position);
 

@@ -1,9 +1,24 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/rig.h"
 
+#include <opencv2/imgproc.hpp>
+
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
+
+View resized(const View& view, int width, int height) {
+  require_fitting_mask(view.mask, view.camera, view.name);
+  View result = view;
+  result.camera = resized(view.camera, width, height);
+  const cv::Size size(width, height);
+  if (view.mask.empty() || view.mask.size() == size) return result;
+  cv::Mat kept;
+  cv::resize(view.mask != 0, kept, size, 0, 0, cv::INTER_AREA);
+  result.mask = kept == 255;
+  return result;
+}
 
 bool is_masked(const View& view, const Eigen::Vector2d& position) {
   if (view.mask.empty()) return false;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -64,6 +66,23 @@ TEST(RigValidation, NamesWhatIsWrong) {
   EXPECT_NE(message_of(rig).find("mask"), std::string::npos);
 
   EXPECT_NE(message_of(Rig{}).find("no cameras"), std::string::npos);
+}
+
+TEST(ResizedViews, ExcludePixelsThatCoverExcludedOnes) {
+  View view = two_views().views[1];
+  EXPECT_TRUE(resized(view, 32, 24).mask.empty());
+  view.mask = cv::Mat(48, 64, CV_8UC1, cv::Scalar(1));
+  view.mask.at<uchar>(20, 31) = 0;
+  const View half = resized(view, 32, 24);
+  EXPECT_TRUE(half.camera == resized(view.camera, 32, 24));
+  EXPECT_TRUE(half.world_from_camera.isApprox(view.world_from_camera));
+  ASSERT_EQ(half.mask.size(), cv::Size(32, 24));
+  EXPECT_EQ(cv::countNonZero(half.mask == 0), 1);
+  EXPECT_EQ(half.mask.at<uchar>(10, 15), 0);
+  EXPECT_EQ(cv::countNonZero(resized(view, 20, 15).mask == 0), 1);
+  EXPECT_THROW(resized(view, 0, 15), Error);
+  view.mask = cv::Mat(48, 63, CV_8UC1, cv::Scalar(1));
+  EXPECT_THROW(resized(view, 32, 24), Error);
 }
 
 TEST(RigGeometry, RelativePoseMovesPoints) {

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT
+// The command line's option to match images smaller than they are.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "widestereo/rig.h"
+
+class SizeSettings {
+ public:
+  /// Adds --max-image-size.
+  void add_to(CLI::App& command);
+  /// A calibrated view as it is matched.
+  widestereo::View reduced(const widestereo::View& calibrated) const;
+  /// Its image likewise. Throws Error unless it has the calibrated size; `name` begins the message.
+  cv::Mat reduced(const cv::Mat& image, const widestereo::View& calibrated,
+                  const std::string& name) const;
+
+ private:
+  cv::Size size_of(const widestereo::Camera& camera) const;
+
+  int largest_side_ = 0;  ///< pixels, 0 = as large as they are
+};
