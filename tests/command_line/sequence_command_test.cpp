@@ -235,15 +235,31 @@ TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
         poses += "1403636579." + std::to_string(k) + "001 0.0 0 0 0 0 0 1\n";
     }
     folder_.write("euroc/mav0/" + name + "/data.csv", list);
+    const std::string x = camera == 0 ? "0" : "0.1";
+    folder_.write("euroc/mav0/" + name + "/sensor.yaml",
+                  "T_BS:\n  cols: 4\n  rows: 4\n  data: [1, 0, 0, " + x +
+                      ", 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]\nresolution: [96, 96]\n"
+                      "camera_model: ds\nintrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]\n" +
+                      (camera == 0 ? "max_theta_deg: 97.5\n" : ""));
   }
   folder_.write("poses.txt", poses);
-  const Outcome outcome = run(sequence("out", "euroc") + "--poses " + file("poses.txt") +
-                              " --first 1 --restart-below 0 --json");
+  const std::string options =
+      "--poses " + file("poses.txt") + " --first 1 --restart-below 0 --json";
+  const Outcome outcome = run(sequence("out", "euroc") + options);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const nlohmann::json frames = nlohmann::json::parse(outcome.output)["frames"];
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_EQ(frames[0]["name"], "001");
   EXPECT_EQ(frames[1]["motion"], "poses");
+  // The data set's own calibration is the same.
+  std::string own = sequence("own", "euroc") + options;
+  own.replace(own.find(file("calib.yaml")), file("calib.yaml").size(), file("euroc"));
+  ASSERT_EQ(run(own).exit_code, 0);
+  for (const char* map : {"/001/distance0.tiff", "/002/distance1.tiff"}) {
+    EXPECT_TRUE(bytes_of(folder_ / ("own" + std::string(map))) ==
+                bytes_of(folder_ / ("out" + std::string(map))))
+        << map;
+  }
 }
 
 /// The same motion as poses of camera 0 (TUM) and as ground truth of the IMU (EuRoC).
