@@ -10,8 +10,7 @@
 
 /// The upper three rows, row by row.
 nlohmann::ordered_json to_json(const Eigen::Isometry3d& pose);
-/// Focal lengths, centre and what the camera's model has besides, by the names of
-/// widestereo::Camera.
+/// Focal lengths, centre and what else differs from a default widestereo::Camera, by its names.
 nlohmann::ordered_json intrinsics_of(const widestereo::Camera& camera);
 nlohmann::ordered_json to_json(const widestereo::View& view);
 /// What tells a file from another one that takes its place: its size and when it was last changed.

@@ -201,6 +201,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
        "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle; 1024 = filled all the "
        "same; 0 = accepted; 16 bit"},
       {"cloud", "world frame, accepted pixels"},
+      {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},
       {"pixels", "integer coordinates are pixel centres"}};
   return record;

@@ -37,7 +37,11 @@ void require_single_keys(const Document& document, const YAML::Node& map,
 void read_yaml(const Document& document, const std::function<void(const YAML::Node& root)>& read) {
   try {
     const YAML::Node root = YAML::Load(without_directive(document.text));
-    if (!root.IsMap()) document.fail("It holds no keys such as cam0 or camera_model.");
+    if (!root.IsMap()) {
+      document.fail(
+          "It holds no keys such as cam0 or camera_model; give a Kalibr camchain or EuRoC's "
+          "sensor.yaml.");
+    }
     require_single_keys(document, root, "");
     read(root);
   } catch (const YAML::Exception& error) {
