@@ -61,13 +61,17 @@ struct Selection {
   RigPoses motion;            ///< no poses where they are not known
 };
 
-/// As they are matched; throws Error unless they have the calibrated sizes.
-std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame, const ws::Rig& calibrated,
-                                 const SizeSettings& size) {
+std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
   std::vector<cv::Mat> images;
-  for (std::size_t i = 0; i < frame.images.size(); ++i) {
-    const std::string file = frame.images[i].string();
-    images.push_back(size.reduced(ws::read_image(file), calibrated.views[i], file));
+  for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
+  return images;
+}
+
+/// A frame's images as they are matched; throws Error unless they have the calibrated sizes.
+std::vector<cv::Mat> reduced(std::vector<cv::Mat> images, const ws::SequenceFrame& frame,
+                             const ws::Rig& calibrated, const SizeSettings& size) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    images[i] = size.reduced(images[i], calibrated.views[i], frame.images[i].string());
   }
   return images;
 }
@@ -79,11 +83,11 @@ Selection select_frames(const SequenceArguments& a) {
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
   const ws::SequenceFrame& start = selection.frames.front();
-  selection.calibrated =
-      a.rig.rig_for_images(cameras.size(), ws::read_image(start.images.front()).size());
+  const std::vector<cv::Mat> images = read_images(start);
+  selection.calibrated = a.rig.rig_for_images(cameras.size(), images.front().size());
   selection.rig = selection.calibrated;
   for (ws::View& view : selection.rig.views) view = a.size.reduced(view);
-  const std::vector<cv::Mat> first = read_images(start, selection.calibrated, a.size);
+  const std::vector<cv::Mat> first = reduced(images, start, selection.calibrated, a.size);
   // The first frame alone decides, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);
   selection.blurs = a.sharpness.blurs(selection.rig, first);
@@ -178,9 +182,13 @@ class SequenceRun {
     double motion_milliseconds = 0;
   };
 
+  std::vector<cv::Mat> images_of(const ws::SequenceFrame& frame) const {
+    return reduced(read_images(frame), frame, selection_.calibrated, arguments_.size);
+  }
+
   void take_up(std::size_t last) {
     const ws::SequenceFrame& frame = selection_.frames[last];
-    const std::vector<cv::Mat> images = read_images(frame, selection_.calibrated, arguments_.size);
+    const std::vector<cv::Mat> images = images_of(frame);
     previous_ = {blurred(images, selection_.blurs), folder_.planes(frame.name, selection_.rig)};
     if (previous_.views.empty() && !arguments_.no_warm_start) {
       std::fprintf(stderr,
@@ -206,7 +214,7 @@ class SequenceRun {
 
   void match(ws::Matcher& matcher, std::size_t index) {
     const ws::SequenceFrame& source = selection_.frames[index];
-    const std::vector<cv::Mat> taken = read_images(source, selection_.calibrated, arguments_.size);
+    const std::vector<cv::Mat> taken = images_of(source);
     const std::vector<cv::Mat> images = blurred(taken, selection_.blurs);
     const ws::Matcher::Progress progress = bar_.part(matched_, remaining_);
     Frame frame;
