@@ -145,10 +145,6 @@ class ReconstructCommand : public ColmapCommand {
     }
     folder_.write(name, text);
   }
-  std::string bytes_of(const std::string& name) const {
-    std::ifstream stream(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
   std::string reconstruct(const std::string& output = "out") const {
     return "reconstruct " + file("images") + " -c " + file("model") + " -o " + file(output) +
            " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2 ";

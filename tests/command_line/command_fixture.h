@@ -80,8 +80,7 @@ cam1:
   /// Writes imucam.yaml: calib.yaml with an IMU at (0.05, -0.04, -0.07) m in the frame of cam0,
   /// turned by 120 degrees.
   void write_calibration_with_imu() {
-    std::ifstream stream(folder_ / "calib.yaml");
-    std::string text(std::istreambuf_iterator<char>(stream), {});
+    std::string text = bytes_of("calib.yaml");
     text.insert(text.find("  camera_model"), R"(  T_cam_imu:
   - [0.0, 0.0, 1.0, 0.05]
   - [1.0, 0.0, 0.0, -0.04]
@@ -92,6 +91,11 @@ cam1:
   }
 
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  /// Of a file in the folder, or of any by its whole path.
+  std::string bytes_of(const std::string& name) const {
+    std::ifstream stream(folder_ / name, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
   std::string depth_of(const std::string& left, const std::string& right,
                        const std::string& calibration = "calib.yaml") const {
     return "depth " + file(left) + " " + file(right) + " -c " + file(calibration) + " -o " +

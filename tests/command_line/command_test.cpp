@@ -79,8 +79,7 @@ class MovingCamera : public Command {
  protected:
   void SetUp() override {
     Command::SetUp();
-    std::ifstream stream(folder_ / "calib.yaml");
-    const std::string text(std::istreambuf_iterator<char>(stream), {});
+    const std::string text = bytes_of("calib.yaml");
     folder_.write("mono.yaml", text.substr(0, text.find("cam1:")));
   }
   std::string depth_at(const std::string& poses, const std::string& output) {
@@ -140,11 +139,7 @@ TEST_F(MovingCamera, OfARealCarFitsItsPoses) {
 TEST_F(Command, BadImagesAreNamed) {
   folder_.write("empty.png", "");
   folder_.write("garbage.png", "this is no image");
-  std::string whole;
-  {
-    std::ifstream stream(folder_ / "left.png", std::ios::binary);
-    whole.assign(std::istreambuf_iterator<char>(stream), {});
-  }
+  const std::string whole = bytes_of("left.png");
   folder_.write("cut.png", whole.substr(0, whole.size() / 2));
   cv::imwrite(file("small.png"), cv::Mat(48, 96, CV_8UC1, cv::Scalar(7)));
   expect_error(depth_of("missing.png", "right.png"), "missing.png");
@@ -302,11 +297,7 @@ TEST_F(Command, BenchmarkFindsOutFirstWhetherItCanWrite) {
 }
 
 TEST_F(Command, ImagesWithoutOverlapAreRefused) {
-  std::string text;
-  {
-    std::ifstream stream(folder_ / "calib.yaml");
-    text.assign(std::istreambuf_iterator<char>(stream), {});
-  }
+  std::string text = bytes_of("calib.yaml");
   // Camera 1 looks backwards through a narrow lens.
   for (const auto& [from, to] :
        {std::pair<std::string, std::string>("[1.0, 0.0, 0.0, -0.1]", "[-1.0, 0.0, 0.0, 0.1]"),
@@ -416,8 +407,7 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
 }
 
 TEST_F(Command, DarkRimsAreLeftOut) {
-  std::ifstream stream(folder_ / "calib.yaml");
-  std::string text(std::istreambuf_iterator<char>(stream), {});
+  std::string text = bytes_of("calib.yaml");
   const std::string limit = "  max_theta_deg: 97.5\n";
   text.erase(text.find(limit), limit.size());
   folder_.write("unlimited.yaml", text);
@@ -505,8 +495,7 @@ TEST_F(Command, SharperImageIsBlurred) {
 }
 
 TEST_F(Command, CalibrationIsRefined) {
-  std::ifstream stream(folder_ / "calib.yaml");
-  std::string text(std::istreambuf_iterator<char>(stream), {});
+  std::string text = bytes_of("calib.yaml");
   // Turned by two degrees about the baseline.
   const std::string rows = "[0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]";
   text.replace(text.find(rows), rows.size(),
@@ -630,8 +619,7 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   for (const nlohmann::json& kernel : row["kernels"]) sum += kernel["operations"].get<double>();
   EXPECT_NEAR(sum, operations, 1);
 
-  std::ifstream svg(folder_ / "speed.svg");
-  const std::string picture{std::istreambuf_iterator<char>(svg), {}};
+  const std::string picture = bytes_of("speed.svg");
   EXPECT_NE(picture.find("cpu  fast  64 x 64"), std::string::npos);
   EXPECT_NE(picture.find("% of operations"), std::string::npos);
   EXPECT_EQ(picture.substr(picture.size() - 7), "</svg>\n");

@@ -20,10 +20,6 @@ class ImageSize : public Command {
   cv::Mat map(const std::string& name) const {
     return cv::imread(file(name), cv::IMREAD_UNCHANGED);
   }
-  std::string bytes_of(const std::string& name) const {
-    std::ifstream stream(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
 };
 
 /// calib.yaml for images of half the size.

@@ -16,10 +16,6 @@ namespace {
 
 class Output : public Command {
  protected:
-  std::string content(const std::string& name) const {
-    std::ifstream stream(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
   std::set<std::string> files_in(const std::string& folder) const {
     std::set<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder_ / folder)) {
@@ -73,7 +69,7 @@ TEST_F(Output, LostStandardOutputIsAnError) {
         "calibration show " + file("calib.yaml"), std::string("--help")}) {
     const Outcome outcome = run(arguments + " > /dev/full 2> " + file("errors.txt") + "; exit $?");
     EXPECT_EQ(outcome.exit_code, 1) << arguments;
-    const std::string errors = content("errors.txt");
+    const std::string errors = bytes_of("errors.txt");
     EXPECT_NE(errors.find("widestereo: Cannot write to standard output"), std::string::npos)
         << errors;
     EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << errors;
@@ -91,7 +87,7 @@ TEST_F(Output, GoesThroughLinksAndFifos) {
   outcome = run(convert + file("link.json") + " --to basalt");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_TRUE(fs::is_symlink(folder_ / "link.json"));
-  EXPECT_NE(content("target.json").find("\"value0\""), std::string::npos);
+  EXPECT_NE(bytes_of("target.json").find("\"value0\""), std::string::npos);
   ASSERT_EQ(mkfifo(file("fifo").c_str(), 0600), 0);
   const int reader = open(file("fifo").c_str(), O_RDONLY | O_NONBLOCK);
   outcome = run(convert + file("fifo") + " --to basalt");
@@ -154,7 +150,7 @@ TEST_F(Output, NamesNeedNotBeUtf8) {
                                        "right.png", "calib\xe9.yaml") +
                               "--json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  for (const std::string& text : {outcome.output, content("out/result.json")}) {
+  for (const std::string& text : {outcome.output, bytes_of("out/result.json")}) {
     const std::string image = nlohmann::json::parse(text)["input"]["images"][0];
     EXPECT_NE(image.find("l\xef\xbf\xbd"
                          "ft.png"),
@@ -176,7 +172,7 @@ TEST_F(Output, PipelineCacheReplacesNothingElse) {
   };
   folder_.write("notes.txt", "mine");
   expect_error(with_cache(file("notes.txt")), "notes.txt is there already");
-  EXPECT_EQ(content("notes.txt"), "mine");
+  EXPECT_EQ(bytes_of("notes.txt"), "mine");
   fs::resize_file(folder_.write("sparse", ""), std::uintmax_t{1} << 31);
   expect_error(with_cache(file("sparse")), "sparse is there already");
   fs::create_symlink("/dev/full", folder_ / "endless");

@@ -15,11 +15,6 @@
 namespace widestereo::test {
 namespace {
 
-std::string bytes_of(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 /// Three frames of noise that moves to the left, 4 pixels apart in the two cameras.
 class SequenceCommand : public Command {
  protected:
