@@ -19,7 +19,7 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
   command
       .add_option("--poses-of", of,
                   "What the poses are of: camera (0 of the calibration) or imu (the calibration "
-                  "has T_cam_imu or T_imu_cam); by default as the file's layout says")
+                  "has T_cam_imu, T_imu_cam or T_BS); by default as the file's layout says")
       ->check(CLI::IsMember({camera, imu}))
       ->needs("--poses")
       ->group(group);
