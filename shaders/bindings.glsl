@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. The images are 2D arrays with
-// one layer for each view, all as large as the largest view.
+// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Images are 2D arrays: of half pixels one
+// for each level, with a layer for each of its views, as texture units must clamp to them; of all else one for all
+// levels, in which coarse views share layers (src/vulkan/atlas.h).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -8,14 +9,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 0) const int WINDOW_RADIUS = 5;
 layout(constant_id = 1) const int WARP = 0;
 layout(constant_id = 2) const int CAMERA_MODEL = -1;
-layout(constant_id = 3) const int VIEW_COUNT = 2;
+layout(constant_id = 3) const int SOURCE_COUNT = 1;
 // How intensities are read, with the same bits either way: GPUs gather four texels in one instruction,
 // software devices load texels without their texture machinery (a quarter faster on lavapipe).
 layout(constant_id = 4) const bool SAMPLED = true;
 layout(constant_id = 5) const int PATTERN = 0;
 layout(constant_id = 6) const int WEIGHTED = 0;
 layout(constant_id = 7) const int FILTER = 0;
-layout(constant_id = 8) const int SOURCE_COUNT = 1;
 #define HAS_DEVICE_FILTER
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
@@ -27,6 +27,10 @@ layout(set = 0, binding = 5) uniform sampler2DArray half_pixel_texture;
 layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
 layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
+layout(set = 0, binding = 9, std140) uniform PlaceBlock {
+  ivec4 map_places[MAX_VIEWS];        // x, y and layer of a view's pixel (0, 0); layers of one kind of map
+  ivec4 intensity_places[MAX_VIEWS];  // likewise
+};
 layout(push_constant) uniform PassBlock {
   PassParameters pass;
 #ifdef HAS_CONVERSION
@@ -34,10 +38,19 @@ layout(push_constant) uniform PassBlock {
 #endif
 };
 
-vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, ivec3(p, view)); }
+ivec3 in_maps(int view, ivec2 p) { return map_places[view].xyz + ivec3(p, 0); }
+
+ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_places[view].w); }
+
+ivec3 in_intensities(int view, ivec2 p) { return intensity_places[view].xyz + ivec3(p, 0); }
+
+// Views of a level follow each other, and sources are of the reference's level.
+int layer_of_half_pixels(int view) { return view - pass.first_view; }
+
+vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, in_maps(view, p)); }
 
 float intensity_at(int view, ivec2 p) {
-  ivec3 texel = ivec3(p + APRON, view);
+  ivec3 texel = in_intensities(view, p);
   if (SAMPLED) return texelFetch(intensity_texture, texel, 0).x;
   return imageLoad(intensities, texel).x;
 }
@@ -45,11 +58,11 @@ float intensity_at(int view, ivec2 p) {
 // Texture coordinates of a position in texels of the memory.
 vec3 half_pixel_position(int view, vec2 texel) {
   vec2 texel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
-  return vec3(texel * texel_size, float(view));
+  return vec3(texel * texel_size, float(layer_of_half_pixels(view)));
 }
 
 float half_pixel_at(int view, ivec2 p) {
-  ivec3 texel = ivec3(p + HALF_PIXEL_APRON, view);
+  ivec3 texel = ivec3(p + HALF_PIXEL_APRON, layer_of_half_pixels(view));
   if (SAMPLED) return texelFetch(half_pixel_texture, texel, 0).x;
   return imageLoad(half_pixels, texel).x;
 }
@@ -69,24 +82,24 @@ float filtered_half_pixel(int view, vec2 texel) {
 }
 
 void store_half_pixel(int view, ivec2 p, float intensity) {
-  imageStore(half_pixels, ivec3(p + HALF_PIXEL_APRON, view), vec4(intensity, 0.0f, 0.0f, 0.0f));
+  imageStore(half_pixels, ivec3(p + HALF_PIXEL_APRON, layer_of_half_pixels(view)), vec4(intensity, 0.0f, 0.0f, 0.0f));
 }
 
-vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, view)); }
+vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(view, p)); }
 
-void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, ivec3(p, view), h); }
+void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, in_maps(view, p), h); }
 
 void store_intensity(int view, ivec2 p, float intensity) {
-  imageStore(intensities, ivec3(p + APRON, view), vec4(intensity, 0.0f, 0.0f, 0.0f));
+  imageStore(intensities, in_intensities(view, p), vec4(intensity, 0.0f, 0.0f, 0.0f));
 }
 
-vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, VIEW_COUNT + view)); }
+vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(1, view, p)); }
 
-void store_prior(int view, ivec2 p, vec4 m) { imageStore(hypotheses, ivec3(p, VIEW_COUNT + view), m); }
+void store_prior(int view, ivec2 p, vec4 m) { imageStore(hypotheses, in_further_maps(1, view, p), m); }
 
-vec4 check_at(int view, ivec2 p) { return imageLoad(hypotheses, ivec3(p, 2 * VIEW_COUNT + view)); }
+vec4 check_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(2, view, p)); }
 
-void store_check(int view, ivec2 p, vec4 c) { imageStore(hypotheses, ivec3(p, 2 * VIEW_COUNT + view), c); }
+void store_check(int view, ivec2 p, vec4 c) { imageStore(hypotheses, in_further_maps(2, view, p), c); }
 
 int transfer_index(ivec2 p) { return p.y * parameters.cameras[pass.reference].size.x + p.x; }
 

@@ -139,7 +139,7 @@ void Conversions::record(VkCommandBuffer commands, const BoundConversions::One& 
   constants.pass.reference = one.view;
   constants.pass.colour = -1;
   constants.pass.last_row = size.height;
-  const std::array sets = {backend_.descriptor_set(), one.set};
+  const std::array sets = {backend_.descriptor_set(0), one.set};
   // Between maps in one buffer, too: synchronization validation sees whole buffers only.
   backend_.record_barrier(commands);
   vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, way.pipeline.get());

@@ -16,8 +16,7 @@ struct Buffer {
   void* mapped = nullptr;
 };
 
-/// A 2D array image (one layer for each view) with memory of its own and a view of all layers. It
-/// is in layout `layout` whenever nothing is being copied.
+/// A 2D array image with memory of its own and a view of all layers.
 struct LayeredImage {
   Handle<VkDeviceMemory> memory;
   Handle<VkImage> handle;

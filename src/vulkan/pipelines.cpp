@@ -107,6 +107,7 @@ void Pipelines::make_layouts(const VulkanContext& context) {
       binding(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
   };
   set_layout_ = make_set_layout(context, bindings);
   const VkDescriptorSetLayout set_layout = set_layout_.get();
@@ -115,16 +116,15 @@ void Pipelines::make_layouts(const VulkanContext& context) {
 
 Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::string& name,
                                    VkPipelineLayout layout, VkPipelineCache cache) const {
-  static constexpr std::array<VkSpecializationMapEntry, 9> entries = {{
+  static constexpr std::array<VkSpecializationMapEntry, 8> entries = {{
       {0, offsetof(Specialisation, constants.window_radius), sizeof(int)},
       {1, offsetof(Specialisation, constants.warp), sizeof(int)},
       {2, offsetof(Specialisation, constants.camera_model), sizeof(int)},
-      {3, offsetof(Specialisation, constants.view_count), sizeof(int)},
+      {3, offsetof(Specialisation, constants.source_count), sizeof(int)},
       {4, offsetof(Specialisation, sampled), sizeof(VkBool32)},
       {5, offsetof(Specialisation, constants.pattern), sizeof(int)},
       {6, offsetof(Specialisation, constants.weighted), sizeof(int)},
       {7, offsetof(Specialisation, constants.filter), sizeof(int)},
-      {8, offsetof(Specialisation, constants.source_count), sizeof(int)},
   }};
   const Handle<VkShaderModule> module = make_module(context, name);
   const VkSpecializationInfo specialisation = {static_cast<std::uint32_t>(entries.size()),

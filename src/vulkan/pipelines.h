@@ -21,6 +21,7 @@ enum Binding : std::uint32_t {
   binding_nearest = 6,
   binding_winner = 7,
   binding_half_pixels = 8,
+  binding_places = 9,
 };
 
 /// How many cover so many pixels of a row or a column.

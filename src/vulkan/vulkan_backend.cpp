@@ -33,7 +33,13 @@ bool runs_on_cpu(const VulkanContext& context) {
   return context.properties().deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
 }
 
-cv::Size largest(const std::vector<cv::Size>& sizes) {
+/// As the block of shaders/bindings.glsl.
+struct PlaceBlock {
+  std::array<std::array<std::int32_t, 4>, MAX_VIEWS> maps{};
+  std::array<std::array<std::int32_t, 4>, MAX_VIEWS> intensities{};
+};
+
+cv::Size largest(std::span<const cv::Size> sizes) {
   cv::Size size;
   for (const cv::Size& one : sizes) {
     size = {std::max(size.width, one.width), std::max(size.height, one.height)};
@@ -50,18 +56,18 @@ VkDeviceSize largest_area(const std::vector<cv::Size>& sizes) {
   return area;
 }
 
-VkBufferImageCopy whole_layer(int layer, cv::Size size, int apron) {
+VkBufferImageCopy region_of(const Atlas::Place& place, cv::Size size) {
   VkBufferImageCopy region{};
-  region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, static_cast<std::uint32_t>(layer), 1};
-  region.imageOffset = {apron, apron, 0};
+  region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, static_cast<std::uint32_t>(place.layer),
+                             1};
+  region.imageOffset = {place.origin.x, place.origin.y, 0};
   region.imageExtent = {static_cast<std::uint32_t>(size.width),
                         static_cast<std::uint32_t>(size.height), 1};
   return region;
 }
 
-VkImageSubresourceRange layers_of(int first, std::size_t count) {
-  return {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, static_cast<std::uint32_t>(first),
-          static_cast<std::uint32_t>(count)};
+VkImageSubresourceRange layer_range(int first, std::uint32_t count) {
+  return {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, static_cast<std::uint32_t>(first), count};
 }
 
 /// `sampled`: images are read as textures. Filters that the device lacks become exact.
@@ -108,48 +114,57 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
                              const VulkanTuning& tuning)
     : context_(context),
       sizes_(sizes),
+      views_of_level_(constants.source_count + 1),
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
       pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
                                 cache.get())),
+      map_atlas_(pack_views(sizes, 0)),
+      intensity_atlas_(pack_views(sizes, APRON)),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
       sampler_(make_sampler(context)),
       command_pool_(make_command_pool(context)) {
   cache.save();
   make_images(context);
-  make_descriptor_set();
+  make_descriptor_sets();
   for (auto& submission : submissions_) {
     submission =
         std::make_unique<Submission>(context, command_pool_.get(), max_bands_per_submission + 1);
   }
-  clear_images();
+  start_memory();
 }
 
 VulkanBackend::~VulkanBackend() = default;
 
 void VulkanBackend::make_images(const VulkanContext& context) {
-  const cv::Size size = largest(sizes_);
-  const int layers = static_cast<int>(sizes_.size());
-  const auto make_map = [&](int layers_of_map, const char* purpose) {
-    return make_image(context, map_format, size, layers_of_map,
+  const auto make_map = [&](int kinds, const char* purpose) {
+    return make_image(context, map_format, map_atlas_.size, kinds * map_atlas_.layers,
                       VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
                           VK_IMAGE_USAGE_TRANSFER_DST_BIT,
                       purpose);
   };
-  const auto make_intensities = [&](cv::Size with_rim, const char* purpose) {
+  const auto make_intensities = [&](cv::Size with_rim, int layers, const char* purpose) {
     return make_image(
         context, intensity_format, with_rim, layers,
         VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
         purpose);
   };
-  intensities_ = make_intensities(with_apron(size), "the images");
-  half_pixels_ = make_intensities(size_of_half_pixels(size), "the images at half pixels");
-  rays_ = make_map(layers, "the viewing rays");
-  hypotheses_ = make_map(3 * layers, "the planes, their priors and the consistency maps");
-  parameters_ = make_device_buffer(
-      context, sizeof(kernel::MatchParameters),
-      VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the parameters");
+  intensities_ = make_intensities(intensity_atlas_.size, intensity_atlas_.layers, "the images");
+  const std::span<const cv::Size> sizes = sizes_;
+  const auto views = static_cast<std::size_t>(views_of_level_);
+  for (std::size_t first = 0; first < sizes.size(); first += views) {
+    half_pixels_.push_back(
+        make_intensities(size_of_half_pixels(largest(sizes.subspan(first, views))), views_of_level_,
+                         "the images at half pixels"));
+  }
+  rays_ = make_map(1, "the viewing rays");
+  hypotheses_ = make_map(3, "the planes, their priors and the consistency maps");
+  constexpr VkBufferUsageFlags uniform =
+      VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  parameters_ =
+      make_device_buffer(context, sizeof(kernel::MatchParameters), uniform, "the parameters");
+  places_ = make_device_buffer(context, sizeof(PlaceBlock), uniform, "the places of the views");
   const VkDeviceSize transfer_bytes = largest_area(sizes_) * sizeof(std::uint32_t);
   for (Buffer* buffer : {&transfer_nearest_, &transfer_winner_}) {
     *buffer = make_device_buffer(context, transfer_bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
@@ -157,23 +172,29 @@ void VulkanBackend::make_images(const VulkanContext& context) {
   }
 }
 
-void VulkanBackend::make_descriptor_set() {
-  const DeviceFunctions& vk = context_.vk();
+void VulkanBackend::make_descriptor_sets() {
+  const auto levels = static_cast<std::uint32_t>(half_pixels_.size());
   const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
-      {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1},
-      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2},
-      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4},
-      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2},
+      {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * levels},
+      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2 * levels},
+      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4 * levels},
+      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * levels},
   }};
-  descriptor_pool_ = make_descriptor_pool(context_, 1, pool_sizes);
-  descriptor_set_ = allocate_set(context_, descriptor_pool_.get(), pipelines_.set_layout());
+  descriptor_pool_ = make_descriptor_pool(context_, levels, pool_sizes);
+  for (const LayeredImage& half_pixels : half_pixels_) {
+    descriptor_sets_.push_back(make_descriptor_set(half_pixels));
+  }
+}
 
+VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& half_pixels_of_level) {
+  const VkDescriptorSet set =
+      allocate_set(context_, descriptor_pool_.get(), pipelines_.set_layout());
   std::vector<VkWriteDescriptorSet> writes;
   const auto write = [&](Binding binding, VkDescriptorType type, const VkDescriptorImageInfo* image,
                          const VkDescriptorBufferInfo* buffer) {
     VkWriteDescriptorSet& one = writes.emplace_back();
     one.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-    one.dstSet = descriptor_set_;
+    one.dstSet = set;
     one.dstBinding = binding;
     one.descriptorCount = 1;
     one.descriptorType = type;
@@ -189,11 +210,13 @@ void VulkanBackend::make_descriptor_set() {
   const VkDescriptorImageInfo intensities = image_info(intensities_, sampler_.get());
   const VkDescriptorImageInfo rays = image_info(rays_, VK_NULL_HANDLE);
   const VkDescriptorImageInfo hypotheses = image_info(hypotheses_, VK_NULL_HANDLE);
-  const VkDescriptorImageInfo half_pixels = image_info(half_pixels_, sampler_.get());
+  const VkDescriptorImageInfo half_pixels = image_info(half_pixels_of_level, sampler_.get());
   const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
+  const VkDescriptorBufferInfo places = buffer_info(places_);
   const VkDescriptorBufferInfo nearest = buffer_info(transfer_nearest_);
   const VkDescriptorBufferInfo winner = buffer_info(transfer_winner_);
   write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
+  write(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &places);
   write(binding_intensity_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &intensities,
         nullptr);
   write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &intensities, nullptr);
@@ -204,26 +227,42 @@ void VulkanBackend::make_descriptor_set() {
   write(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &half_pixels, nullptr);
   write(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &nearest);
   write(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &winner);
-  vk.vkUpdateDescriptorSets(context_.device(), static_cast<std::uint32_t>(writes.size()),
-                            writes.data(), 0, nullptr);
+  context_.vk().vkUpdateDescriptorSets(context_.device(), static_cast<std::uint32_t>(writes.size()),
+                                       writes.data(), 0, nullptr);
+  return set;
 }
 
-void VulkanBackend::clear_images() {
+VkDescriptorSet VulkanBackend::descriptor_set(int first_view) const {
+  return descriptor_sets_.at(static_cast<std::size_t>(first_view / views_of_level_));
+}
+
+void VulkanBackend::start_memory() {
   const VkCommandBuffer commands = submissions_[0]->begin();
+  const auto clear = [&](const LayeredImage& image, const VkClearColorValue& value) {
+    const VkImageSubresourceRange all = layer_range(0, VK_REMAINING_ARRAY_LAYERS);
+    transition(commands, image, all, VK_IMAGE_LAYOUT_UNDEFINED,
+               VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
+    context_.vk().vkCmdClearColorImage(commands, image.handle.get(),
+                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &value, 1, &all);
+    transition(commands, image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
+  };
   VkClearColorValue masked{};
   masked.float32[0] = MASKED_INTENSITY;
-  for (const LayeredImage* image : {&intensities_, &half_pixels_, &rays_, &hypotheses_}) {
-    const VkImageSubresourceRange all =
-        layers_of(0, image == &hypotheses_ ? 3 * sizes_.size() : sizes_.size());
-    transition(commands, *image, all, VK_IMAGE_LAYOUT_UNDEFINED,
-               VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
-    const bool is_map = image == &rays_ || image == &hypotheses_;
-    const VkClearColorValue value = is_map ? VkClearColorValue{} : masked;
-    context_.vk().vkCmdClearColorImage(commands, image->handle.get(),
-                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &value, 1, &all);
-    transition(commands, *image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-               VK_IMAGE_LAYOUT_GENERAL);
+  clear(intensities_, masked);
+  for (const LayeredImage& half_pixels : half_pixels_) clear(half_pixels, masked);
+  clear(rays_, {});
+  clear(hypotheses_, {});
+
+  PlaceBlock block;
+  for (std::size_t view = 0; view < sizes_.size(); ++view) {
+    const auto place_in = [view](const Atlas& atlas) {
+      const Atlas::Place& place = atlas.places[view];
+      return std::array{place.origin.x, place.origin.y, place.layer, atlas.layers};
+    };
+    block.maps[view] = place_in(map_atlas_);
+    block.intensities[view] = place_in(intensity_atlas_);
   }
+  context_.vk().vkCmdUpdateBuffer(commands, places_.handle.get(), 0, sizeof block, &block);
   submissions_[0]->submit();
   submissions_[0]->wait();
 }
@@ -256,14 +295,15 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stage
                                      nullptr, 0, nullptr);
 }
 
-void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map, int type,
-                           int apron) {
+void VulkanBackend::upload(const LayeredImage& image, const Atlas& atlas, int view,
+                           const cv::Mat& map, int type) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   require_map(map, view, size, type);
   map.copyTo(cv::Mat(size, type, staging_.mapped));
+  const Atlas::Place& place = atlas.places[static_cast<std::size_t>(view)];
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange layer = layers_of(view, 1);
-  const VkBufferImageCopy region = whole_layer(view, size, apron);
+  const VkImageSubresourceRange layer = layer_range(place.layer, 1);
+  const VkBufferImageCopy region = region_of(place, size);
   transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
@@ -272,16 +312,20 @@ void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& m
   submissions_[0]->wait();
 }
 
-cv::Mat VulkanBackend::download(const LayeredImage& image, int view, int layer) {
+cv::Mat VulkanBackend::download(int kind, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
+  Atlas::Place place = map_atlas_.places[static_cast<std::size_t>(view)];
+  place.layer += kind * map_atlas_.layers;
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange range = layers_of(layer, 1);
-  const VkBufferImageCopy region = whole_layer(layer, size, 0);
-  transition(commands, image, range, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
-  context_.vk().vkCmdCopyImageToBuffer(commands, image.handle.get(),
+  const VkImageSubresourceRange range = layer_range(place.layer, 1);
+  const VkBufferImageCopy region = region_of(place, size);
+  transition(commands, hypotheses_, range, VK_IMAGE_LAYOUT_GENERAL,
+             VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
+  context_.vk().vkCmdCopyImageToBuffer(commands, hypotheses_.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging_.handle.get(),
                                        1, &region);
-  transition(commands, image, range, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
+  transition(commands, hypotheses_, range, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+             VK_IMAGE_LAYOUT_GENERAL);
   barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();
@@ -289,25 +333,23 @@ cv::Mat VulkanBackend::download(const LayeredImage& image, int view, int layer) 
 }
 
 void VulkanBackend::set_rays(int view, const cv::Mat& rays) {
-  upload(rays_, view, rays, CV_32FC4, 0);
+  upload(rays_, map_atlas_, view, rays, CV_32FC4);
 }
 void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
-  upload(intensities_, view, intensity, CV_32FC1, APRON);
+  upload(intensities_, intensity_atlas_, view, intensity, CV_32FC1);
 }
 void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
-  upload(hypotheses_, view, hypotheses, CV_32FC4, 0);
+  upload(hypotheses_, map_atlas_, view, hypotheses, CV_32FC4);
 }
-cv::Mat VulkanBackend::hypotheses(int view) { return download(hypotheses_, view, view); }
-cv::Mat VulkanBackend::checks(int view) {
-  return download(hypotheses_, view, 2 * static_cast<int>(sizes_.size()) + view);
-}
+cv::Mat VulkanBackend::hypotheses(int view) { return download(0, view); }
+cv::Mat VulkanBackend::checks(int view) { return download(2, view); }
 
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;
-  for (const LayeredImage* image : {&intensities_, &half_pixels_, &rays_, &hypotheses_}) {
-    bytes += image->bytes;
-  }
-  for (const Buffer* buffer : {&parameters_, &transfer_nearest_, &transfer_winner_, &staging_}) {
+  for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_}) bytes += image->bytes;
+  for (const LayeredImage& half_pixels : half_pixels_) bytes += half_pixels.bytes;
+  for (const Buffer* buffer :
+       {&parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
     bytes += buffer->bytes;
   }
   return static_cast<std::size_t>(bytes);
@@ -332,9 +374,10 @@ void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) cons
   record_barrier(commands);
   vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE,
                        pipelines_.get(band.dispatch->kernel));
-  vk.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.layout(), 0, 1,
-                             &descriptor_set_, 0, nullptr);
   kernel::PassParameters pass = band.dispatch->pass;
+  const VkDescriptorSet set = descriptor_set(pass.first_view);
+  vk.vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_.layout(), 0, 1,
+                             &set, 0, nullptr);
   pass.first_row = band.first_row;
   pass.last_row = band.last_row;
   vk.vkCmdPushConstants(commands, pipelines_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof pass,

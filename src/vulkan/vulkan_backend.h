@@ -9,6 +9,7 @@
 
 #include "matching/backend.h"
 #include "schedule/bands.h"
+#include "vulkan/atlas.h"
 #include "vulkan/memory.h"
 #include "vulkan/pipeline_cache.h"
 #include "vulkan/pipelines.h"
@@ -47,8 +48,9 @@ class VulkanBackend final : public Backend {
   /// Lets a kernel see what earlier ones wrote.
   void record_barrier(VkCommandBuffer commands) const;
   const Pipelines& pipelines() const { return pipelines_; }
-  /// Of Pipelines::set_layout(): all that kernels read and write.
-  VkDescriptorSet descriptor_set() const { return descriptor_set_; }
+  /// Of Pipelines::set_layout(): all that kernels of a level read and write, which is named by its
+  /// first view.
+  VkDescriptorSet descriptor_set(int first_view) const;
 
   void set_rays(int view, const cv::Mat& rays) override;
   void set_intensity(int view, const cv::Mat& intensity) override;
@@ -63,33 +65,39 @@ class VulkanBackend final : public Backend {
   struct Run;  // of run(): what is in flight
 
   void make_images(const VulkanContext& context);
-  void make_descriptor_set();
-  void clear_images();
+  void make_descriptor_sets();
+  VkDescriptorSet make_descriptor_set(const LayeredImage& half_pixels_of_level);
+  void start_memory();
   void transition(VkCommandBuffer commands, const LayeredImage& image,
                   const VkImageSubresourceRange& layers, VkImageLayout from,
                   VkImageLayout to) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
-  /// `apron`: where the map begins in the image, both ways.
-  void upload(const LayeredImage& image, int view, const cv::Mat& map, int type, int apron);
-  cv::Mat download(const LayeredImage& image, int view, int layer);
+  void upload(const LayeredImage& image, const Atlas& atlas, int view, const cv::Mat& map,
+              int type);
+  /// `kind`: of the maps in hypotheses_.
+  cv::Mat download(int kind, int view);
 
   const VulkanContext& context_;
   std::vector<cv::Size> sizes_;
+  int views_of_level_;
   KernelConstants constants_;
   long long max_samples_;
   Pipelines pipelines_;
+  Atlas map_atlas_;
+  Atlas intensity_atlas_;
   LayeredImage intensities_;
   LayeredImage rays_;
-  LayeredImage half_pixels_;
-  LayeredImage hypotheses_;  // then priors, then checks, each a layer for each view
+  std::vector<LayeredImage> half_pixels_;  // of each level
+  LayeredImage hypotheses_;                // then priors, then checks
   Buffer parameters_;
+  Buffer places_;
   Buffer transfer_nearest_;
   Buffer transfer_winner_;
   Buffer staging_;
   Handle<VkSampler> sampler_;
   Handle<VkDescriptorPool> descriptor_pool_;
-  VkDescriptorSet descriptor_set_ = VK_NULL_HANDLE;
+  std::vector<VkDescriptorSet> descriptor_sets_;  // of each level
   Handle<VkCommandPool> command_pool_;
   std::array<std::unique_ptr<Submission>, 2> submissions_;  // one is recorded while the other runs
   KernelTimes times_;
