@@ -6,7 +6,7 @@
 
 // Movement in the source, pixels per unit of inverse distance; zero where it cannot be measured.
 FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   float step = 0.002f * (PARAMETERS.range.w - PARAMETERS.range.z);
   vec2 low;
@@ -100,7 +100,7 @@ FN vec3 source_plane(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
   vec3 none = vec3(0.0f, 0.0f, 0.0f);
   vec4 held = hypothesis_in_source(CONTEXT source, ray, m);
   vec3 plane = vec3(held.x, held.y, held.z);
-  ViewPair back = PARAMETERS.pairs[source * MAX_VIEWS + PASS.reference];
+  ViewPair back = pair_between(CONTEXT source, PASS.reference);
   if (held.w >= INVALID_COST || side_of_source(back, plane) <= 0.0f) return none;
   return plane_in_source(back, plane);
 }

@@ -31,7 +31,7 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
 
 // Source pixels that the point moves per unit of inverse distance, at its own. Zero at an epipole.
 FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   float step = 0.01f * (PARAMETERS.range.w - PARAMETERS.range.z);
   if (w + step > PARAMETERS.range.w) step = -step;

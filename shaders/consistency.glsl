@@ -10,7 +10,7 @@
 // where the source's own plane puts it; UNKNOWN_DIFFERENCE where the source has no plane there.
 FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec3 m) {
   vec2 unknown = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   vec4 other = hypothesis_in_source(CONTEXT source, ray, m);
   if (other.w >= INVALID_COST) return unknown;
 

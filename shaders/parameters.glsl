@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What the host tells the kernels: one block for a match, one small block for a dispatch.
 
-// Views at all levels of the image pyramid.
-#define MAX_VIEWS 16
+// Images that are matched with each other, and views: those at all levels of their pyramids.
+#define MAX_IMAGES 16
+#define MAX_VIEWS 48
 
 // Every image of intensities is surrounded by this many masked pixels, one more than the largest window's radius, so
 // that patches need no checks of their own.
@@ -92,8 +93,9 @@ struct MatchParameters {
                       // preference for far planes
   ivec4 frame;        // number of the frame since the last one that was started anew; unused
   CameraParameters cameras[MAX_VIEWS];
-  // [reference * MAX_VIEWS + source]: source from reference; of a view with itself: now from the previous frame
-  ViewPair pairs[MAX_VIEWS * MAX_VIEWS];
+  // Of images, at all levels alike; [reference * MAX_IMAGES + source]: source from reference; of an image with itself:
+  // now from the previous frame
+  ViewPair pairs[MAX_IMAGES * MAX_IMAGES];
 };
 
 // Push constants.

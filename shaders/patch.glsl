@@ -57,7 +57,7 @@ FN bool warp_pixel(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int 
 
 // The pixel of the source in which the point lands; false where it lands outside.
 FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2) q) {
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
   q = ivec2(0, 0);
@@ -238,7 +238,7 @@ FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
 FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   int reference = PASS.reference;
-  ViewPair pair = PARAMETERS.pairs[reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   PatchStart start;
@@ -290,7 +290,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
 
 // Mean over the best sources that see the patch; INVALID_COST when none does.
 FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
-  float best[MAX_VIEWS];
+  float best[MAX_IMAGES];
   int count = 0;
   for (int i = 0; i < SOURCE_COUNT; ++i) {
     float cost = source_cost(CONTEXT source_at(CONTEXT i), pixel, m);

@@ -9,7 +9,12 @@ FN int source_at(CONTEXT_ARGUMENT int i) {
   return view < PASS.reference ? view : view + 1;
 }
 
-// A constant where all views agree, for the same reason.
+// Of two views of the level.
+FN ViewPair pair_between(CONTEXT_ARGUMENT int reference, int source) {
+  return PARAMETERS.pairs[(reference - PASS.first_view) * MAX_IMAGES + source - PASS.first_view];
+}
+
+// A constant where all views agree: devices that mask lanes would compute every model.
 FN int model_of(CONTEXT_ARGUMENT CameraParameters camera) {
   return CAMERA_MODEL >= 0 ? CAMERA_MODEL : camera.size.z;
 }

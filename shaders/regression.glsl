@@ -31,7 +31,7 @@
 // Direction in the reference image, per pixel of displacement along `along` (unit) in the source: the inverse of
 // the map's derivative at the pixel; `along` itself where the derivative cannot be measured.
 FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 along) {
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   vec2 left;
@@ -64,7 +64,7 @@ FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) slope) {
 // How far (px, along the source's curve) the plane's patch lies from where it matches best, by one step of least
 // squares: the source's intensities are gain (a + shift slope) + offset. Zero where that tells nothing.
 FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 direction) {
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   PatchStart start;

@@ -15,7 +15,7 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   vec4 ray = ray_at(CONTEXT PASS.other, p);
   vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
   if (ray.w == 0.0f || plane.w >= INVALID_COST) return false;
-  ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
+  ViewPair pair = pair_between(CONTEXT PASS.other, PASS.reference);
   CameraParameters camera = PARAMETERS.cameras[PASS.reference];
   vec3 m = vec3(plane.x, plane.y, plane.z);
   vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
@@ -73,7 +73,7 @@ FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   int width = PARAMETERS.cameras[PASS.other].size.x;
   ivec2 p = ivec2(int(index) % width, int(index) / width);
   vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
-  ViewPair pair = PARAMETERS.pairs[PASS.other * MAX_VIEWS + PASS.reference];
+  ViewPair pair = pair_between(CONTEXT PASS.other, PASS.reference);
   vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
   if (admissible(CONTEXT ray, moved)) return moved;
   return none;

@@ -38,7 +38,7 @@ FN float support_between(float w, float candidate, float scale) {
 // Inverse of the mean squared difference of intensity over the middle of the patch, noise included. It must not explain
 // a wrong plane by gain and offset, as a correlation of so few pixels could.
 FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
-  ViewPair pair = PARAMETERS.pairs[PASS.reference * MAX_VIEWS + source];
+  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   float n = 0.0f;
   float sum = 0.0f;

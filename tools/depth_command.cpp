@@ -19,7 +19,7 @@ namespace ws = widestereo;
 
 namespace {
 
-constexpr int most_images = 8;
+constexpr int most_images = 16;  // of a Matcher
 constexpr int default_sources = 2;
 
 struct DepthArguments {
@@ -103,8 +103,7 @@ void add_depth_command(CLI::App& app) {
   command
       ->add_option("--sources", arguments->sources,
                    "How many others of the model join one image, best first (default " +
-                       std::to_string(default_sources) +
-                       "; with the three levels of quality and fast 4 at most)")
+                       std::to_string(default_sources) + ")")
       ->check(CLI::Range(1, most_images - 1));
   arguments->size.add_to(*command);
   arguments->sharpness.add_to(*command);

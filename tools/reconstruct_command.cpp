@@ -29,7 +29,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr int most_sources = 7;
+constexpr int most_sources = 15;  // of one more image, a Matcher takes 16
 const cv::Size preview_size(1024, 768);
 
 struct ReconstructArguments {

@@ -101,8 +101,7 @@ class Matcher {
   using Progress = std::function<void(double)>;
 
   /// Throws Error when the rig or the options are invalid or the device lacks memory or a feature.
-  /// Views times levels (Options::levels; 1 of SearchMethod::random) may be 16 at most: with the
-  /// three levels of "quality" and "fast" 5 views, with the one of "paper" 16.
+  /// A rig may have 16 views, with four levels (Options::levels) 12.
   Matcher(Device& device, const Rig& rig, const Options& options);
   ~Matcher();
   Matcher(Matcher&&) noexcept;

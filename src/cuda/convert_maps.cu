@@ -111,7 +111,7 @@ __global__ void start_views(FrameStart start, MatchParameters* parameters) {
   const int view = static_cast<int>(threadIdx.x);
   if (view >= start.views) return;
   if (view == 0) parameters->frame.x = start.counted ? parameters->frame.x + 1 : start.frame;
-  parameters->pairs[view * MAX_VIEWS + view] =
+  parameters->pairs[view * MAX_IMAGES + view] =
       start.now_from_previous != nullptr
           ? pair_of(start.now_from_previous, start.rig_from_camera[view])
           : start.pairs[view];
@@ -146,7 +146,7 @@ cudaError_t export_maps(const ViewMemory& view, const CudaViewMaps& maps, int he
 cudaError_t start_frame(const FrameStart& start, MatchParameters* parameters, cudaStream_t stream) {
   FrameStart start_argument = start;
   void* arguments[] = {&start_argument, &parameters};
-  return cudaLaunchKernel(reinterpret_cast<const void*>(&start_views), dim3(1), dim3(MAX_VIEWS),
+  return cudaLaunchKernel(reinterpret_cast<const void*>(&start_views), dim3(1), dim3(MAX_IMAGES),
                           arguments, 0, stream);
 }
 

@@ -20,11 +20,11 @@ cudaError_t export_maps(const kernel::cuda::ViewMemory& view, const CudaViewMaps
 /// What changes from one warm start to the next.
 struct FrameStart {
   int views;
-  int frame;                              ///< its number, unless it is counted
-  bool counted;                           ///< one more than in the parameters
-  const double* now_from_previous;        ///< of the rig, 3x4 row-major in device memory, or null:
-  kernel::ViewPair pairs[MAX_VIEWS];      ///< the motion of each view
-  double rig_from_camera[MAX_VIEWS][12];  ///< 3x4 row-major
+  int frame;                               ///< its number, unless it is counted
+  bool counted;                            ///< one more than in the parameters
+  const double* now_from_previous;         ///< of the rig, 3x4 row-major in device memory, or null:
+  kernel::ViewPair pairs[MAX_IMAGES];      ///< the motion of each view
+  double rig_from_camera[MAX_IMAGES][12];  ///< 3x4 row-major
 };
 static_assert(sizeof(FrameStart) <= 4000);  // with a pointer an argument of CUDA 11
 

@@ -111,7 +111,7 @@ class CudaMatcher::Implementation {
     result.counted = !start.frame.has_value();
     result.now_from_previous = start.device_now_from_previous;
     for (int i = 0; i < result.views; ++i) {
-      result.pairs[i] = setup_.warm_schedule.parameters.pairs[i * MAX_VIEWS + i];
+      result.pairs[i] = setup_.warm_schedule.parameters.pairs[i * MAX_IMAGES + i];
       Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(result.rig_from_camera[i]) =
           rig_.views[static_cast<std::size_t>(i)].world_from_camera.matrix().topRows<3>();
     }

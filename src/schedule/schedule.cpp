@@ -33,7 +33,9 @@ kernel::ViewPair view_pair(const Eigen::Isometry3d& source_from_reference) {
   return {row(0), row(1), row(2)};
 }
 
-kernel::MatchParameters match_parameters(const std::vector<View>& all, const Options& options) {
+/// `all`: the rig's views, which are `images`, and then those at coarser levels.
+kernel::MatchParameters match_parameters(const std::vector<View>& all, int images,
+                                         const Options& options) {
   constexpr double degree = std::numbers::pi / 180;
   const auto single = [](double value) { return static_cast<float>(value); };
   kernel::MatchParameters p{};
@@ -50,10 +52,10 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, const Opt
                single(options.ambiguity_margin), single(options.far_preference)};
   const int views = static_cast<int>(all.size());
   p.search = {static_cast<int>(options.sampling), options.refinements, options.best_sources, views};
-  for (int i = 0; i < views; ++i) {
-    p.cameras[i] = kernel_camera(all[i].camera);
-    for (int j = 0; j < views; ++j) {
-      p.pairs[i * MAX_VIEWS + j] = view_pair(source_from_reference(all[j], all[i]));
+  for (int i = 0; i < views; ++i) p.cameras[i] = kernel_camera(all[i].camera);
+  for (int i = 0; i < images; ++i) {
+    for (int j = 0; j < images; ++j) {
+      p.pairs[i * MAX_IMAGES + j] = view_pair(source_from_reference(all[j], all[i]));
     }
   }
   return p;
@@ -117,7 +119,7 @@ class Builder {
                            .pattern = static_cast<int>(options.pattern),
                            .weighted = options.weight_scale > 0 ? 1 : 0,
                            .filter = static_cast<int>(options.filter)};
-    schedule_.parameters = match_parameters(schedule_.views, options);
+    schedule_.parameters = match_parameters(schedule_.views, views_of_rig_, options);
   }
 
   Schedule build_cold() {
@@ -142,18 +144,17 @@ class Builder {
   }
 
  private:
-  /// Kernels number the views of all levels together.
-  void require_few_enough(std::size_t views) const {
-    const std::size_t most = static_cast<std::size_t>(MAX_VIEWS / levels_);
-    if (views <= most) return;
-    const std::size_t levels_for_all = MAX_VIEWS / views;
-    throw Error("The rig has " + std::to_string(views) + " views, but " + std::to_string(levels_) +
-                " pyramid level(s) allow " + std::to_string(most) + " (views times levels may be " +
-                std::to_string(MAX_VIEWS) + "); match fewer images" +
-                (levels_for_all > 0 ? ", or choose --levels " + std::to_string(levels_for_all) +
-                                          " with as many --level-iterations and "
-                                          "--level-regressions."
-                                    : "."));
+  /// Kernels number the images, and the views of all levels together.
+  void require_few_enough(std::size_t images) const {
+    const int most = std::min(MAX_IMAGES, MAX_VIEWS / levels_);
+    if (images <= static_cast<std::size_t>(most)) return;
+    throw Error("The rig has " + std::to_string(images) + " views, but " + std::to_string(levels_) +
+                " pyramid level(s) allow " + std::to_string(most) + "; match fewer images" +
+                (images <= MAX_IMAGES
+                     ? ", or choose --levels " +
+                           std::to_string(MAX_VIEWS / static_cast<int>(images)) +
+                           " with as many --level-iterations and --level-regressions."
+                     : "."));
   }
 
   Schedule finished() {
@@ -512,7 +513,7 @@ void set_motion(Schedule& schedule, const Rig& rig, const Eigen::Isometry3d& now
   schedule.parameters.frame.x = frame;
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     const Eigen::Isometry3d& rig_from_camera = rig.views[i].world_from_camera;
-    schedule.parameters.pairs[i * MAX_VIEWS + i] =
+    schedule.parameters.pairs[i * MAX_IMAGES + i] =
         view_pair(rig_from_camera.inverse() * now_from_previous * rig_from_camera);
   }
 }

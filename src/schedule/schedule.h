@@ -72,8 +72,8 @@ struct Schedule {
 /// Samples of a patch at its full window.
 long long samples_of_patch(int window_radius, int pattern);
 
-/// Throws Error when rig or options are invalid, there are fewer than 2 views, or those of all
-/// levels together are more than MAX_VIEWS.
+/// Throws Error when rig or options are invalid, there are fewer than 2 views, more than
+/// MAX_IMAGES, or those of all levels together are more than MAX_VIEWS.
 Schedule make_schedule(const Rig& rig, const Options& options);
 
 /// The schedule of a frame that starts from the planes which the views hold, those of the previous

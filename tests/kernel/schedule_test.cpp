@@ -23,18 +23,23 @@ Rig rig_of(std::size_t count) {
   return rig;
 }
 
-TEST(ViewLimit, CountsTheViewsOfAllLevels) {
+TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
   const Options three_levels = Options::preset_named("quality");
-  EXPECT_EQ(make_schedule(rig_of(5), three_levels).views.size(), 15u);
-  EXPECT_THAT(error_of([&] { make_schedule(rig_of(6), three_levels); }),
-              AllOf(HasSubstr("6 views, but 3 pyramid level(s) allow 5"), HasSubstr("fewer images"),
-                    HasSubstr("--levels 2 ")));
-  EXPECT_NE(error_of([&] { make_warm_schedule(rig_of(6), three_levels); }), "");
+  EXPECT_EQ(make_schedule(rig_of(16), three_levels).views.size(), 48u);
+  EXPECT_THAT(error_of([&] { make_schedule(rig_of(17), three_levels); }),
+              AllOf(HasSubstr("17 views, but 3 pyramid level(s) allow 16"),
+                    HasSubstr("fewer images"), ::testing::Not(HasSubstr("--levels"))));
+  EXPECT_NE(error_of([&] { make_warm_schedule(rig_of(17), three_levels); }), "");
+  Options four_levels = three_levels;
+  four_levels.levels = 4;
+  four_levels.level_iterations.insert(four_levels.level_iterations.begin(), 1);
+  four_levels.level_regressions.insert(four_levels.level_regressions.begin(), 0);
+  EXPECT_EQ(make_schedule(rig_of(12), four_levels).views.size(), 48u);
+  EXPECT_THAT(
+      error_of([&] { make_schedule(rig_of(13), four_levels); }),
+      AllOf(HasSubstr("13 views, but 4 pyramid level(s) allow 12"), HasSubstr("--levels 3 ")));
   const Options one_level = Options::preset_named("paper");
   EXPECT_EQ(make_schedule(rig_of(16), one_level).views.size(), 16u);
-  EXPECT_THAT(error_of([&] { make_schedule(rig_of(17), one_level); }),
-              AllOf(HasSubstr("17 views, but 1 pyramid level(s) allow 16"),
-                    ::testing::Not(HasSubstr("--levels"))));
   Rig one = rig_of(2);
   one.views.pop_back();
   EXPECT_THAT(error_of([&] { make_schedule(one, one_level); }), HasSubstr("1 view(s)"));
