@@ -11,6 +11,7 @@
 #define CAMERA_EXTENDED_UNIFIED 5
 #define CAMERA_FIELD_OF_VIEW 6
 #define CAMERA_MEI 7
+#define CAMERA_EQUIRECTANGULAR 8
 
 // std140: five 16-byte rows.
 struct CameraParameters {
@@ -63,6 +64,11 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     real scale = rho > real(0) ? distorted / rho : camera.shape.y / (camera.shape.x * point.z);
     x = point.x * scale;
     y = point.y * scale;
+  } else if (model == CAMERA_EQUIRECTANGULAR) {
+    // The last meridian, on both edges of the image, and the poles have no pixel.
+    inside = inside && (point.x * point.x > real(0) || point.z > real(0));
+    x = arc_tangent(point.x, point.z);
+    y = arc_tangent(point.y, sqrt(point.x * point.x + point.z * point.z));
   } else {
     real denominator = point.z;
     if (model == CAMERA_DOUBLE_SPHERE) {

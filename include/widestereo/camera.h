@@ -22,8 +22,9 @@ enum class CameraModel : int {
   double_sphere = 3,     ///< xi, alpha (Usenko, Demmel, Cremers, 3DV 2018)
   unified = 4,           ///< (x, y) / (z + xi d): Kalibr omni; xi = alpha / (1 - alpha)
   extended_unified = 5,  ///< alpha, beta (Khomutenko, Garcia, Martinet, RA-L 2016)
-  field_of_view = 6,  ///< omega (Devernay, Faugeras, 2001), with atan2: reaches beyond 90 degrees
-  mei = 7,            ///< unified, then Brown-Conrady: OpenCV omnidir, Kalibr omni + radtan
+  field_of_view = 6,    ///< omega (Devernay, Faugeras, 2001), with atan2: reaches beyond 90 degrees
+  mei = 7,              ///< unified, then Brown-Conrady: OpenCV omnidir, Kalibr omni + radtan
+  equirectangular = 8,  ///< (longitude, latitude) = (atan2(x, z), atan2(y, sqrt(x^2 + z^2)))
 };
 
 /// The model's name as used in messages, JSON and --help, for example "kannala_brandt".
@@ -49,6 +50,10 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
 };
+
+/// An equirectangular image of the whole sphere (twice as wide as high where pixels are square);
+/// the middle column looks along +z.
+Camera whole_sphere(int width, int height);
 
 /// Throws Error unless the camera's size and parameters are finite, in range and usable.
 /// `name` (for example "camchain.yaml: cam0") begins the message.

@@ -35,7 +35,7 @@ const std::vector<ColmapModel>& colmap_models() {
       {"SIMPLE_FISHEYE", 1, kannala_brandt, {}},
       {"FISHEYE", 2, kannala_brandt, {}},
       {"EUCM", 2, extended_unified, {&C::alpha, &C::beta}},
-      {"EQUIRECTANGULAR", 0, {}, {}}};
+      {"EQUIRECTANGULAR", 0, equirectangular, {}}};
   return models;
 }
 
@@ -59,6 +59,12 @@ Camera camera_of(const ColmapCamera& record, const std::string& name) {
   constexpr double beyond_any_image = 1e6;  // which validate() refuses
   camera.width = static_cast<int>(std::min(record.width, beyond_any_image));
   camera.height = static_cast<int>(std::min(record.height, beyond_any_image));
+  if (camera.model == CameraModel::equirectangular) {
+    // Its parameters are the size, which images may have been reduced from.
+    return resized(whole_sphere(static_cast<int>(std::clamp(next[0], 0.0, beyond_any_image)),
+                                static_cast<int>(std::clamp(next[1], 0.0, beyond_any_image))),
+                   camera.width, camera.height);
+  }
   camera.fx = *next++;
   camera.fy = model.focal_lengths == 2 ? *next++ : camera.fx;
   // COLMAP's pixel centres lie at half pixels.

@@ -112,6 +112,8 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
       return {"pinhole", f, "fov", {c.omega}};
     case CameraModel::mei:
       return {"omni", with({c.xi}), "radtan", radtan};
+    case CameraModel::equirectangular:
+      return {"equirectangular", f, "none", {}};
   }
   throw Error("Cannot write " + path.string() + ": unknown camera model.");
 }

@@ -113,26 +113,38 @@ class Reader {
     return name == "OPENCV" && number_or(0, frame, i, "k3") != 0 ? "FULL_OPENCV" : name;
   }
 
+  /// Focal lengths and principal point.
+  std::vector<double> pinhole_parameters(const Json& frame, std::size_t i, const ColmapModel& model,
+                                         const ColmapCamera& camera) const {
+    std::vector<double> parameters = {
+        focal_length(frame, i, "fl_x", "camera_angle_x", camera.width)};
+    if (model.focal_lengths == 2) {
+      const bool has_fy = has(frame, "fl_y") || has(frame, "camera_angle_y");
+      parameters.push_back(has_fy ? focal_length(frame, i, "fl_y", "camera_angle_y", camera.height)
+                                  : parameters.front());
+    }
+    parameters.push_back(number_or(camera.width / 2, frame, i, "cx"));
+    parameters.push_back(number_or(camera.height / 2, frame, i, "cy"));
+    return parameters;
+  }
+
   ColmapCamera camera_of(const Json& frame, std::size_t i) const {
     const std::string name = model_name(frame, i);
     const ColmapModel* model = find_colmap_model(name);
     if (model == nullptr || !model->equivalent) {
       fail(i, "The camera model " + name +
-                  " is not supported; OPENCV_FISHEYE, OPENCV and PINHOLE are.");
+                  " is not supported; OPENCV_FISHEYE, OPENCV, PINHOLE and EQUIRECTANGULAR are.");
     }
     ColmapCamera camera;
     camera.model = model;
     camera.width = number(frame, i, "w");
     camera.height = number(frame, i, "h");
-    const double fx = focal_length(frame, i, "fl_x", "camera_angle_x", camera.width);
-    const bool has_fy = has(frame, "fl_y") || has(frame, "camera_angle_y");
-    camera.parameters.push_back(fx);
-    if (model->focal_lengths == 2) {
-      camera.parameters.push_back(
-          has_fy ? focal_length(frame, i, "fl_y", "camera_angle_y", camera.height) : fx);
+    if (model->equivalent == CameraModel::equirectangular) {
+      // Whatever focal lengths writers invent for a whole sphere.
+      camera.parameters = {camera.width, camera.height};
+    } else {
+      camera.parameters = pinhole_parameters(frame, i, *model, camera);
     }
-    camera.parameters.push_back(number_or(camera.width / 2, frame, i, "cx"));
-    camera.parameters.push_back(number_or(camera.height / 2, frame, i, "cy"));
     std::size_t used = 0;
     std::size_t given = 0;
     for (const auto& [key, member] : coefficient_keys) {

@@ -124,9 +124,9 @@ Eigen::Isometry3d YamlCamera::motion(const char* key) const {
 View YamlCamera::view() const {
   View view;
   view.name = name_;
+  set_resolution(view.camera);
   set_projection(view.camera);
   set_distortion(view.camera);
-  set_resolution(view.camera);
   if (has("max_theta_deg")) {
     view.camera.max_theta = number(node_["max_theta_deg"], "max_theta_deg") * degree;
   }
@@ -159,8 +159,12 @@ void YamlCamera::set_projection(Camera& camera) const {
     const std::vector<double> values = intrinsics(2);
     camera.xi = values[0];
     camera.alpha = values[1];
+  } else if (model == "equirectangular") {
+    camera = whole_sphere(camera.width, camera.height);
+    if (has("intrinsics")) intrinsics(0);
   } else {
-    fail("The camera_model \"" + model + "\" is unknown; use pinhole, omni, eucm or ds.");
+    fail("The camera_model \"" + model +
+         "\" is unknown; use pinhole, omni, eucm, ds or equirectangular.");
   }
 }
 
@@ -179,7 +183,7 @@ void YamlCamera::set_distortion(Camera& camera) const {
     fail("The distortion_model \"" + model + "\" does not go with camera_model \"" +
          text("camera_model") +
          "\" here; use radtan, equidistant, fov or none with "
-         "pinhole, radtan or none with omni, and none with eucm and ds.");
+         "pinhole, radtan or none with omni, and none with eucm, ds and equirectangular.");
   };
   if (model == "radtan" && (pinhole || camera.model == CameraModel::unified)) {
     const std::vector<double> d = numbers(coefficients, 4);

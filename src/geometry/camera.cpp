@@ -185,6 +185,14 @@ bool direction_of(const Camera& c, const kernel::precise::CameraParameters& p, V
           2 * std::tan(c.omega / 2) * std::cos(angle);
       return true;
     }
+    case CameraModel::equirectangular: {
+      if (std::abs(m.x()) >= std::numbers::pi || std::abs(m.y()) >= std::numbers::pi / 2) {
+        return false;
+      }
+      const double level = std::cos(m.y());
+      direction << level * std::sin(m.x()), std::sin(m.y()), level * std::cos(m.x());
+      return true;
+    }
   }
   return false;
 }
@@ -210,15 +218,28 @@ std::string size_text(int width, int height) {
 }  // namespace
 
 std::string to_string(CameraModel model) {
-  static const std::array<const char*, 8> names = {
-      "pinhole", "pinhole_radtan",   "kannala_brandt", "double_sphere",
-      "unified", "extended_unified", "field_of_view",  "mei"};
+  static const std::array<const char*, 9> names = {
+      "pinhole",        "pinhole_radtan",   "kannala_brandt", "double_sphere",
+      "unified",        "extended_unified", "field_of_view",  "mei",
+      "equirectangular"};
   const auto index = static_cast<std::size_t>(model);
   if (index >= names.size()) {
     throw Error("The camera model number " + std::to_string(static_cast<int>(model)) +
                 " is unknown; use one of CameraModel.");
   }
   return names[index];
+}
+
+Camera whole_sphere(int width, int height) {
+  Camera camera;
+  camera.model = CameraModel::equirectangular;
+  camera.width = width;
+  camera.height = height;
+  camera.fx = width / (2 * std::numbers::pi);
+  camera.fy = height / std::numbers::pi;
+  camera.cx = 0.5 * (width - 1);
+  camera.cy = 0.5 * (height - 1);
+  return camera;
 }
 
 class PreparedCamera::Implementation {

@@ -58,6 +58,7 @@ Parameters fill(const Camera& c) {
   double limit = unlimited;
   switch (c.model) {
     case CameraModel::pinhole:
+    case CameraModel::equirectangular:
       break;
     case CameraModel::pinhole_radtan:
       limit = radtan_limit(c);

@@ -76,6 +76,7 @@ void validate(const Camera& c, const std::string& name) {
     case CameraModel::pinhole:
     case CameraModel::pinhole_radtan:
     case CameraModel::kannala_brandt:
+    case CameraModel::equirectangular:
       break;
     case CameraModel::double_sphere:
       require(c.xi > -1 && c.xi <= 1, name, "xi", c.xi, "a double sphere needs it in (-1, 1]");

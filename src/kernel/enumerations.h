@@ -17,6 +17,7 @@ static_assert(CAMERA_UNIFIED == static_cast<int>(CameraModel::unified));
 static_assert(CAMERA_EXTENDED_UNIFIED == static_cast<int>(CameraModel::extended_unified));
 static_assert(CAMERA_FIELD_OF_VIEW == static_cast<int>(CameraModel::field_of_view));
 static_assert(CAMERA_MEI == static_cast<int>(CameraModel::mei));
+static_assert(CAMERA_EQUIRECTANGULAR == static_cast<int>(CameraModel::equirectangular));
 
 static_assert(WARP_EXACT == static_cast<int>(PatchWarp::exact));
 static_assert(WARP_AFFINE == static_cast<int>(PatchWarp::affine));

@@ -49,6 +49,8 @@ int projection(int model) {
       return common + 7 + to_pixels;
     case CameraModel::mei:
       return common + 3 + perspective + distortion + to_pixels;
+    case CameraModel::equirectangular:
+      return common + 7 + to_pixels;
     case CameraModel::pinhole:
       break;
   }

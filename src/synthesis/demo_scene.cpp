@@ -96,9 +96,13 @@ RenderedPair render_demo_from(const Eigen::Isometry3d& world_from_rig, int size,
   const Rig rig = demo_rig(size);
   Rig moved = rig;
   for (View& view : moved.views) view.world_from_camera = world_from_rig * view.world_from_camera;
-  RenderedPair pair = synthesis::render(furnished_room(), moved, seed);
+  RenderedPair pair = render_demo_room(moved, seed);
   pair.rig = rig;
   return pair;
+}
+
+RenderedPair render_demo_room(const Rig& rig, std::uint32_t seed) {
+  return synthesis::render(furnished_room(), rig, seed);
 }
 
 RenderedPair render_plane(const Rig& rig, const Eigen::Vector3d& normal, double offset,

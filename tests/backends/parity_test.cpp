@@ -302,6 +302,26 @@ TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
   expect_no_validation_messages(*device);
 }
 
+// Also what is behind and beside the cameras, but for the seam, the poles and the epipoles.
+TEST_P(EveryDevice, MatchesPanoramas) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Rig rig = render_demo(64).rig;
+  for (View& view : rig.views) view.camera = whole_sphere(144, 72);
+  rig.views[1].world_from_camera.translation() = Eigen::Vector3d(0.1, 0.1, 0);
+  const RenderedPair pair = render_demo_room(rig);
+  Options options = Options::preset_named("fast");
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
+  for (int view = 0; view < 2; ++view) {
+    const std::vector<RegionScores> scores =
+        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
+                 rig.views[1 - view]);
+    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.05) << to_table(scores);
+    EXPECT_LT(scores.back().bad_pixels.at(1.0), 0.05) << "behind: " << to_table(scores);
+  }
+  expect_no_validation_messages(*device);
+}
+
 TEST_P(EveryDevice, UsesThreeViews) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   Rig rig = render_demo(64).rig;

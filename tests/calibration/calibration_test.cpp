@@ -177,6 +177,12 @@ TEST(Kalibr, ReadsEveryCombination) {
   c = read("eucm", "[0.6, 1.1, 400, 401, 320, 240]", "none", "[]");
   EXPECT_EQ(c.model, CameraModel::extended_unified);
   EXPECT_EQ(c.beta, 1.1);
+  c = read("equirectangular", "[100, 101, 320, 240]", "none", "[]");
+  EXPECT_EQ(c.model, CameraModel::equirectangular);
+  EXPECT_EQ(c.fy, 101);
+  const std::string panorama = "cam0:\n  camera_model: equirectangular\n  resolution: [640, 320]\n";
+  EXPECT_EQ(read_calibration(folder.write("sphere.yaml", panorama)).rig.views[0].camera,
+            whole_sphere(640, 320));
 }
 
 TEST(Kalibr, ReadsFilesWithOpenCvsHeader) {

@@ -180,13 +180,15 @@ TEST_F(Colmap, ConvertsEveryModelWithAnEquivalent) {
   EXPECT_EQ(camera("SIMPLE_FISHEYE 8 8 2 4 4").model, CameraModel::kannala_brandt);
   EXPECT_EQ(camera("FISHEYE 8 8 2 3 4 4").fy, 3);
   EXPECT_EQ(camera("EUCM 8 8 2 3 4 4 0.6 1.1").beta, 1.1);
+  EXPECT_EQ(camera("EQUIRECTANGULAR 8 4 8 4"), whole_sphere(8, 4));
+  EXPECT_NEAR(camera("EQUIRECTANGULAR 8 4 16 8").fx, whole_sphere(8, 4).fx, 1e-12);
 }
 
 TEST_F(Colmap, RefusesModelsWithoutEquivalentByName) {
   for (const char* line : {"THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0.01 0 0.3 0.4 0 0",
                            "FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0.6 0 0",
                            "RAD_TAN_THIN_PRISM_FISHEYE 8 8 2 3 4 4 0 0 0 0 0 0 0 0 0 0 0 0",
-                           "DIVISION 8 8 2 3 4 4 0.1", "EQUIRECTANGULAR 8 4 8 4"}) {
+                           "DIVISION 8 8 2 3 4 4 0.1"}) {
     const std::string model(line, std::string(line).find(' '));
     const std::string message = test::error_of([&] { camera(line); });
     EXPECT_NE(message.find("cameras.txt: The camera model " + model), std::string::npos) << message;

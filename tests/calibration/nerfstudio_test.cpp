@@ -75,6 +75,12 @@ TEST_F(Nerfstudio, InstantNgpsWordsAreKnown) {
   EXPECT_NEAR(seen.camera.fy, 50, 1e-9);
 }
 
+TEST_F(Nerfstudio, PanoramasAreWholeSpheres) {
+  const char* panorama = R"("camera_model": "EQUIRECTANGULAR", "w": 96, "h": 48, "fl_x": 48,
+                            "fl_y": 48, "cx": 48, "cy": 24)";
+  EXPECT_EQ(view(file(panorama, frame("a.png"))).camera, whole_sphere(96, 48));
+}
+
 TEST_F(Nerfstudio, PosesAreTurnedIntoOurAxes) {
   const Eigen::Isometry3d world_from_camera = view(file(fisheye, frame("a.png"))).world_from_camera;
   EXPECT_LT((world_from_camera.translation() - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
@@ -119,8 +125,7 @@ TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
          "rigid");
   expect(file(R"("w": 9, "h": 9)", frame("a.png")), "fl_x");
   expect(file(R"("fl_x": 9, "h": 9)", frame("a.png")), "\"w\"");
-  expect(file(R"("camera_model": "EQUIRECTANGULAR", "w": 9, "h": 9)", frame("a.png")),
-         "EQUIRECTANGULAR");
+  expect(file(R"("camera_model": "ORTHOPHOTO", "w": 9, "h": 9)", frame("a.png")), "ORTHOPHOTO");
   expect(file(std::string(fisheye) + R"(, "p1": 0.1)", frame("a.png")), "coefficients");
   for (const char* key : {"k4", "k5", "sx1"}) {
     expect(file(R"("w": 9, "h": 9, "fl_x": 9, ")" + std::string(key) + R"(": 0.1)", frame("a.png")),

@@ -120,6 +120,9 @@ std::vector<NamedCamera> cameras() {
   c.p1 = 0.00042223;
   c.p2 = 0.00042462;
   list.push_back({"kitti360_mei", c});
+  list.push_back({"panorama", whole_sphere(1024, 512)});
+  list.push_back(
+      {"part_of_a_panorama", make(CameraModel::equirectangular, 600, 300, 210, 205, 250.5, 170)});
   return list;
 }
 
@@ -502,6 +505,8 @@ Camera random_camera(CameraModel model, std::mt19937& random) {
     case CameraModel::field_of_view:
       c.omega = 0.01 + 3 * unit(random);
       break;
+    case CameraModel::equirectangular:
+      break;
   }
   return c;
 }
@@ -509,7 +514,7 @@ Camera random_camera(CameraModel model, std::mt19937& random) {
 TEST(RandomCameras, RoundTripUpToTheEdgeOfTheDomain) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
-  for (int model = 0; model < 8; ++model) {
+  for (int model = 0; model < 9; ++model) {
     int checked = 0;
     for (int i = 0; i < 100; ++i) {
       const Camera camera = random_camera(static_cast<CameraModel>(model), random);
@@ -548,6 +553,41 @@ TEST(BehindTheCamera, OnlyWideModelsSeeSidewaysAndBackwards) {
     Vector2d pixel;
     EXPECT_FALSE(project(camera, {0, 0, -1}, pixel)) << named.name;
   }
+}
+
+TEST(WholeSphere, LooksAllAround) {
+  const Camera c = whole_sphere(360, 180);  // a pixel is a degree
+  EXPECT_EQ(c.model, CameraModel::equirectangular);
+  const auto expect = [&c](const Vector3d& direction, double u, double v) {
+    Vector2d pixel;
+    ASSERT_TRUE(project(c, direction, pixel)) << direction.transpose();
+    EXPECT_NEAR(pixel.x(), u, 1e-9) << direction.transpose();
+    EXPECT_NEAR(pixel.y(), v, 1e-9) << direction.transpose();
+  };
+  expect({0, 0, 1}, 179.5, 89.5);
+  expect({3, 0, 0}, 269.5, 89.5);
+  expect({-3, 0, 0}, 89.5, 89.5);
+  expect({1, 0, 1}, 224.5, 89.5);
+  expect({0, 1, 1}, 179.5, 134.5);
+  expect({std::sqrt(0.5), -1, -std::sqrt(0.5)}, 314.5, 44.5);
+  expect({1e-12, 0, -1}, 359.5, 89.5);
+  expect({-1e-12, 0, -1}, -0.5, 89.5);
+  // Every pixel has a ray, and their solid angles add up to the sphere's.
+  double solid_angle = 0;
+  for (int v = 0; v < 180; ++v) {
+    for (int u = 0; u < 360; ++u) {
+      Vector3d ray;
+      ASSERT_TRUE(unproject(c, {u, v}, ray)) << u << " " << v;
+      solid_angle += degree * degree * std::hypot(ray.x(), ray.z());
+    }
+  }
+  EXPECT_NEAR(solid_angle, 4 * std::numbers::pi, 1e-3);
+  Vector3d ray;
+  EXPECT_FALSE(unproject(c, {359.6, 90}, ray));
+  EXPECT_FALSE(unproject(c, {-0.6, 90}, ray));
+  EXPECT_FALSE(unproject(c, {90, 179.6}, ray));
+  Vector2d pixel;
+  EXPECT_FALSE(project(c, {0, 1, 0}, pixel)) << "a pole";
 }
 
 TEST(BehindTheCamera, PixelsBeyondTheModelHaveNoRay) {
@@ -604,9 +644,9 @@ TEST(RayImage, RefusesWhatDoesNotFit) {
 
 TEST(ModelNames, AreDistinctAndUnknownModelsRefused) {
   std::set<std::string> names;
-  for (int i = 0; i < 8; ++i) names.insert(to_string(static_cast<CameraModel>(i)));
-  EXPECT_EQ(names.size(), 8U);
-  EXPECT_THROW(to_string(static_cast<CameraModel>(8)), Error);
+  for (int i = 0; i < 9; ++i) names.insert(to_string(static_cast<CameraModel>(i)));
+  EXPECT_EQ(names.size(), 9U);
+  EXPECT_THROW(to_string(static_cast<CameraModel>(9)), Error);
   EXPECT_THROW(to_string(static_cast<CameraModel>(-1)), Error);
 }
 

@@ -39,7 +39,7 @@ counting::Counts run_patch(const Options& options, CameraModel model) {
 }
 
 TEST(Work, OfAPatchIsWhatRunningItTakes) {
-  for (int model = 0; model < 8; ++model) {
+  for (int model = 0; model < 9; ++model) {
     for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
       for (const double weight_scale : {0.0, 12.0}) {
         for (const PatchPattern pattern : {PatchPattern::dense, PatchPattern::checkerboard}) {
