@@ -124,9 +124,9 @@ Eigen::Isometry3d YamlCamera::motion(const char* key) const {
 View YamlCamera::view() const {
   View view;
   view.name = name_;
-  set_resolution(view.camera);
   set_projection(view.camera);
   set_distortion(view.camera);
+  set_resolution(view.camera);
   if (has("max_theta_deg")) {
     view.camera.max_theta = number(node_["max_theta_deg"], "max_theta_deg") * degree;
   }
@@ -160,6 +160,7 @@ void YamlCamera::set_projection(Camera& camera) const {
     camera.xi = values[0];
     camera.alpha = values[1];
   } else if (model == "equirectangular") {
+    set_resolution(camera);
     camera = whole_sphere(camera.width, camera.height);
     if (has("intrinsics")) intrinsics(0);
   } else {

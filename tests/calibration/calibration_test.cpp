@@ -413,6 +413,18 @@ TEST(Writing, RoundTripsExactly) {
   }
 }
 
+TEST(Writing, PanoramasGoToKalibrAlone) {
+  const TemporaryFolder folder;
+  Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  for (View& view : rig.views) view.camera = whole_sphere(640, 320);
+  write_kalibr(folder / "spheres.yaml", rig);
+  for (const View& view : read_calibration(folder / "spheres.yaml").rig.views) {
+    EXPECT_EQ(view.camera, whole_sphere(640, 320));
+  }
+  EXPECT_NE(test::error_of([&] { write_basalt(folder / "a.json", rig); }).find("equirectangular"),
+            std::string::npos);
+}
+
 TEST(Writing, RefusesWhatAFormatCannotHold) {
   const TemporaryFolder folder;
   const Rig rig = read_calibration(folder.write("stereo.yml", opencv_text)).rig;  // has skew
