@@ -144,17 +144,20 @@ struct Algorithm {
   }
 };
 
-// One block a multiprocessor is asked for: left to itself, ptxas spills registers for one block
-// more of seven.
-#define ENTRY_POINT(name, view)                                          \
-  template <class C>                                                     \
-  __global__ void __launch_bounds__(block_width* block_height, 1)        \
-      name(const __grid_constant__ Context context) {                    \
-    ivec2 pixel;                                                         \
-    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) { \
-      Algorithm<C>::name##_pixel(context, pixel);                        \
-    }                                                                    \
+// Blocks that a multiprocessor must be able to hold: with more, or without a bound, ptxas spills
+// registers (tools/cuda_kernel_report).
+constexpr int blocks_of_presets = 5;
+
+#define ENTRY_POINT_OF_BLOCKS(name, view, blocks)                                                  \
+  template <class C>                                                                               \
+  __global__ void __launch_bounds__(block_width* block_height, C::window_radius >= 0 ? blocks : 1) \
+      name(const __grid_constant__ Context context) {                                              \
+    ivec2 pixel;                                                                                   \
+    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) {                           \
+      Algorithm<C>::name##_pixel(context, pixel);                                                  \
+    }                                                                                              \
   }
+#define ENTRY_POINT(name, view) ENTRY_POINT_OF_BLOCKS(name, view, blocks_of_presets)
 
 ENTRY_POINT(initialise, reference)
 ENTRY_POINT(iterate, reference)
@@ -162,7 +165,7 @@ ENTRY_POINT(transfer_clear, reference)
 ENTRY_POINT(transfer_nearest, other)
 ENTRY_POINT(transfer_winner, other)
 ENTRY_POINT(transfer_gather, reference)
-ENTRY_POINT(check, reference)
+ENTRY_POINT_OF_BLOCKS(check, reference, 1)
 ENTRY_POINT(downsample, reference)
 ENTRY_POINT(sweep, reference)
 ENTRY_POINT(upsample, reference)
