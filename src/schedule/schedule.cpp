@@ -114,7 +114,6 @@ class Builder {
     schedule_.constants = {.camera_model = common_model(),
                            .window_radius = options.window_radius,
                            .warp = static_cast<int>(options.warp),
-                           .view_count = static_cast<int>(schedule_.views.size()),
                            .source_count = views_of_rig_ - 1,
                            .pattern = static_cast<int>(options.pattern),
                            .weighted = options.weight_scale > 0 ? 1 : 0,

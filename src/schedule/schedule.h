@@ -43,7 +43,6 @@ struct KernelConstants {
   int camera_model = -1;  ///< of all views when they agree, else -1
   int window_radius = 5;
   int warp = 0;
-  int view_count = 2;  ///< at all levels
   int source_count = 1;
   int pattern = 0;
   int weighted = 0;
