@@ -19,13 +19,24 @@ namespace {
 struct DemoArguments {
   std::string output = "demo";
   int size = 384;
+  bool panorama = false;
   MatchSettings settings;
   FolderFormat format;
   bool as_json = false;
 };
 
+ws::RenderedPair render(const DemoArguments& arguments) {
+  ws::Rig rig = ws::demo_rig(arguments.size);
+  if (arguments.panorama) {
+    for (ws::View& view : rig.views) {
+      view.camera = ws::whole_sphere(2 * arguments.size, arguments.size);
+    }
+  }
+  return ws::render_demo_room(rig);
+}
+
 void run_demo(DemoArguments arguments) {
-  const ws::RenderedPair pair = ws::render_demo(arguments.size);
+  const ws::RenderedPair pair = render(arguments);
   const auto [nearest, farthest] = ws::demo_distance_range();
   if (!arguments.settings.min_distance) arguments.settings.min_distance = nearest;
   if (!arguments.settings.max_distance) arguments.settings.max_distance = farthest;
@@ -40,7 +51,7 @@ void run_demo(DemoArguments arguments) {
   const MatchingRun run = match_images(arguments.settings, pair.rig, images, arguments.output);
   FolderContents contents{.rig = pair.rig, .images = images, .run = run};
   contents.truths = truths;
-  contents.origin = {{"scene", "demo"}, {"size", arguments.size}};
+  contents.origin = {{"scene", "demo"}, {"size", arguments.size}, {"panorama", arguments.panorama}};
   contents.scores = ws::evaluate(run.result.views[0].distance, run.result.views[0].normals,
                                  truths[0], pair.rig.views[0], pair.rig.views[1]);
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
@@ -59,9 +70,13 @@ void add_demo_command(CLI::App& app) {
   auto arguments = std::make_shared<DemoArguments>();
   command->add_option("-o,--output", arguments->output, "Folder for the results")
       ->capture_default_str();
-  command->add_option("--size", arguments->size, "Side of the square images, pixels")
+  command
+      ->add_option("--size", arguments->size,
+                   "Side of the square images, pixels; of panoramas, height")
       ->check(CLI::Range(64, 4096))
       ->capture_default_str();
+  command->add_flag("--panorama", arguments->panorama,
+                    "See the whole sphere in equirectangular images, in place of two fisheyes");
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record and the scores as JSON");
   arguments->settings.add_to(*command);

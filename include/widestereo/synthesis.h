@@ -24,10 +24,12 @@ struct RenderedPair {
   std::vector<RenderedView> views;  ///< as many as rig.views
 };
 
-/// The scene of `widestereo demo`: a textured room with slanted and curved surfaces and occlusions,
-/// seen by two double-sphere cameras of 195 degrees with a 0.1 m baseline; surfaces reach beyond 90
-/// degrees off axis. `size` is the side of the square images in pixels; the field of view does not
-/// depend on it.
+/// The cameras of `widestereo demo`: two double spheres of 195 degrees with a 0.1 m baseline.
+/// `size` is the side of the square images in pixels; the field of view does not depend on it.
+Rig demo_rig(int size);
+
+/// What they see: a textured room with slanted and curved surfaces and occlusions, which reach
+/// beyond 90 degrees off axis.
 RenderedPair render_demo(int size, std::uint32_t seed = 1);
 
 /// The same seen after the rig has moved to `world_from_rig` (metres; the demo is the identity).

@@ -63,7 +63,8 @@ Scene furnished_room() {
   return scene;
 }
 
-/// Two double-sphere lenses of 195 degrees, 0.1 m apart, slightly turned against each other.
+}  // namespace
+
 Rig demo_rig(int size) {
   Rig rig;
   for (int i = 0; i < 2; ++i) {
@@ -82,8 +83,6 @@ Rig demo_rig(int size) {
   rig.views[1].world_from_camera = pose({0.1, 0.002, -0.001}, -0.4, 2.2, 0.3);
   return rig;
 }
-
-}  // namespace
 
 std::pair<double, double> demo_distance_range() { return {0.4, 8}; }
 

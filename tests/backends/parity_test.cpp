@@ -209,7 +209,7 @@ TEST_P(Parity, ExactFilteringGivesTheBitsOfTheCpu) {
 TEST_P(Parity, SixViewsOfTwoSizesGiveTheBitsOfTheCpu) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   if (const std::string why = why_bits_may_differ(*device); !why.empty()) GTEST_SKIP() << why;
-  const Rig demo = render_demo(64).rig;
+  const Rig demo = demo_rig(64);
   Rig rig;
   for (int i = 0; i < 6; ++i) {
     View view = demo.views[0];
@@ -305,7 +305,7 @@ TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
 // Also what is behind and beside the cameras, but for the seam, the poles and the epipoles.
 TEST_P(EveryDevice, MatchesPanoramas) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
-  Rig rig = render_demo(64).rig;
+  Rig rig = demo_rig(72);
   for (View& view : rig.views) view.camera = whole_sphere(144, 72);
   rig.views[1].world_from_camera.translation() = Eigen::Vector3d(0.1, 0.1, 0);
   const RenderedPair pair = render_demo_room(rig);

@@ -34,6 +34,18 @@ TEST_F(Command, DemoScoresItself) {
   }
 }
 
+TEST_F(Command, DemoShowsPanoramas) {
+  const Outcome outcome =
+      run("demo --panorama --size 72 --preset fast --device cpu --json -o " + file("demo"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(record["views"][0]["model"], "equirectangular");
+  EXPECT_EQ(record["views"][1]["width"], 144);
+  const nlohmann::json& behind = record["scores"][5];
+  EXPECT_EQ(behind["region"], ">90 deg");
+  EXPECT_LT(behind["bad_pixels"]["1.0"].get<double>(), 0.1);
+}
+
 TEST_F(Command, DepthWritesEveryFormatAndJson) {
   const Outcome outcome = run(depth_of("left.png", "right.png") + "--formats tiff,pfm,png --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
