@@ -60,10 +60,8 @@ Camera camera_of(const ColmapCamera& record, const std::string& name) {
   camera.width = static_cast<int>(std::min(record.width, beyond_any_image));
   camera.height = static_cast<int>(std::min(record.height, beyond_any_image));
   if (camera.model == CameraModel::equirectangular) {
-    // Its parameters are the size, which images may have been reduced from.
-    return resized(whole_sphere(static_cast<int>(std::clamp(next[0], 0.0, beyond_any_image)),
-                                static_cast<int>(std::clamp(next[1], 0.0, beyond_any_image))),
-                   camera.width, camera.height);
+    // Its parameters repeat the size.
+    return whole_sphere(camera.width, camera.height);
   }
   camera.fx = *next++;
   camera.fy = model.focal_lengths == 2 ? *next++ : camera.fx;
