@@ -19,7 +19,6 @@ namespace ws = widestereo;
 
 namespace {
 
-constexpr int most_images = 16;  // of a Matcher
 constexpr int default_sources = 2;
 
 struct DepthArguments {
@@ -98,13 +97,13 @@ void add_depth_command(CLI::App& app) {
                    "LEFT RIGHT (or more views of one rig, or of a moving one); or one image of a "
                    "COLMAP model, which others join")
       ->required()
-      ->expected(1, most_images);
+      ->expected(1, ws::Matcher::most_views);
   add_image_options(*command, arguments->rig, arguments->poses);
   command
       ->add_option("--sources", arguments->sources,
                    "How many others of the model join one image, best first (default " +
                        std::to_string(default_sources) + ")")
-      ->check(CLI::Range(1, most_images - 1));
+      ->check(CLI::Range(1, ws::Matcher::most_views - 1));
   arguments->size.add_to(*command);
   arguments->sharpness.add_to(*command);
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();

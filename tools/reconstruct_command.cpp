@@ -29,7 +29,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr int most_sources = 15;  // of one more image, a Matcher takes 16
 const cv::Size preview_size(1024, 768);
 
 struct ReconstructArguments {
@@ -301,7 +300,7 @@ void add_reconstruct_command(CLI::App& app) {
   command
       ->add_option("--sources", a->sources,
                    "How many others each image is matched with: groups have one more")
-      ->check(CLI::Range(1, most_sources))
+      ->check(CLI::Range(1, ws::Matcher::most_views - 1))
       ->capture_default_str();
   command->add_flag("--overwrite", a->overwrite, "Remove the results of an earlier run first");
   const std::string fusion = "Fusion";

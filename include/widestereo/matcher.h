@@ -100,8 +100,10 @@ class Matcher {
   /// Called between submissions with the share done in [0, 1].
   using Progress = std::function<void(double)>;
 
+  /// Views that a rig may have; with four levels (Options::levels) it is 12.
+  static constexpr int most_views = 16;
+
   /// Throws Error when the rig or the options are invalid or the device lacks memory or a feature.
-  /// A rig may have 16 views, with four levels (Options::levels) 12.
   Matcher(Device& device, const Rig& rig, const Options& options);
   ~Matcher();
   Matcher(Matcher&&) noexcept;

@@ -19,6 +19,8 @@ static_assert(CAMERA_FIELD_OF_VIEW == static_cast<int>(CameraModel::field_of_vie
 static_assert(CAMERA_MEI == static_cast<int>(CameraModel::mei));
 static_assert(CAMERA_EQUIRECTANGULAR == static_cast<int>(CameraModel::equirectangular));
 
+static_assert(MAX_IMAGES == Matcher::most_views);
+
 static_assert(WARP_EXACT == static_cast<int>(PatchWarp::exact));
 static_assert(WARP_AFFINE == static_cast<int>(PatchWarp::affine));
 static_assert(WARP_QUADRATIC == static_cast<int>(PatchWarp::quadratic));

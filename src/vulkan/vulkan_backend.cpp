@@ -114,7 +114,6 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
                              const VulkanTuning& tuning)
     : context_(context),
       sizes_(sizes),
-      views_of_level_(constants.source_count + 1),
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
@@ -152,14 +151,14 @@ void VulkanBackend::make_images(const VulkanContext& context) {
   };
   intensities_ = make_intensities(intensity_atlas_.size, intensity_atlas_.layers, "the images");
   const std::span<const cv::Size> sizes = sizes_;
-  const auto views = static_cast<std::size_t>(views_of_level_);
+  const auto views = static_cast<std::size_t>(views_of_level());
   for (std::size_t first = 0; first < sizes.size(); first += views) {
     half_pixels_.push_back(
-        make_intensities(size_of_half_pixels(largest(sizes.subspan(first, views))), views_of_level_,
-                         "the images at half pixels"));
+        make_intensities(size_of_half_pixels(largest(sizes.subspan(first, views))),
+                         views_of_level(), "the images at half pixels"));
   }
   rays_ = make_map(1, "the viewing rays");
-  hypotheses_ = make_map(3, "the planes, their priors and the consistency maps");
+  hypotheses_ = make_map(map_kinds, "the planes, their priors and the consistency maps");
   constexpr VkBufferUsageFlags uniform =
       VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   parameters_ =
@@ -233,7 +232,7 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& half_pixe
 }
 
 VkDescriptorSet VulkanBackend::descriptor_set(int first_view) const {
-  return descriptor_sets_.at(static_cast<std::size_t>(first_view / views_of_level_));
+  return descriptor_sets_.at(static_cast<std::size_t>(first_view / views_of_level()));
 }
 
 void VulkanBackend::start_memory() {
@@ -312,7 +311,7 @@ void VulkanBackend::upload(const LayeredImage& image, const Atlas& atlas, int vi
   submissions_[0]->wait();
 }
 
-cv::Mat VulkanBackend::download(int kind, int view) {
+cv::Mat VulkanBackend::download(MapKind kind, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   Atlas::Place place = map_atlas_.places[static_cast<std::size_t>(view)];
   place.layer += kind * map_atlas_.layers;
@@ -341,8 +340,8 @@ void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
 void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
   upload(hypotheses_, map_atlas_, view, hypotheses, CV_32FC4);
 }
-cv::Mat VulkanBackend::hypotheses(int view) { return download(0, view); }
-cv::Mat VulkanBackend::checks(int view) { return download(2, view); }
+cv::Mat VulkanBackend::hypotheses(int view) { return download(planes, view); }
+cv::Mat VulkanBackend::checks(int view) { return download(checks_of_planes, view); }
 
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;

@@ -63,6 +63,8 @@ class VulkanBackend final : public Backend {
 
  private:
   struct Run;  // of run(): what is in flight
+  /// What hypotheses_ holds behind each other, by its numbers in shaders/bindings.glsl.
+  enum MapKind : int { planes, priors, checks_of_planes, map_kinds };
 
   void make_images(const VulkanContext& context);
   void make_descriptor_sets();
@@ -75,12 +77,11 @@ class VulkanBackend final : public Backend {
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
   void upload(const LayeredImage& image, const Atlas& atlas, int view, const cv::Mat& map,
               int type);
-  /// `kind`: of the maps in hypotheses_.
-  cv::Mat download(int kind, int view);
+  cv::Mat download(MapKind kind, int view);
+  int views_of_level() const { return constants_.source_count + 1; }
 
   const VulkanContext& context_;
   std::vector<cv::Size> sizes_;
-  int views_of_level_;
   KernelConstants constants_;
   long long max_samples_;
   Pipelines pipelines_;
@@ -89,7 +90,7 @@ class VulkanBackend final : public Backend {
   LayeredImage intensities_;
   LayeredImage rays_;
   std::vector<LayeredImage> half_pixels_;  // of each level
-  LayeredImage hypotheses_;                // then priors, then checks
+  LayeredImage hypotheses_;                // of each MapKind
   Buffer parameters_;
   Buffer places_;
   Buffer transfer_nearest_;
