@@ -276,7 +276,7 @@ TEST_P(EveryDevice, FindsTheDemoSceneTwiceWithTheSameBits) {
 
 TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
-  Rig rig = render_demo(64).rig;
+  Rig rig = demo_rig(64);
   Camera& other = rig.views[1].camera;
   other.model = CameraModel::kannala_brandt;
   other.width = 80;
@@ -324,7 +324,7 @@ TEST_P(EveryDevice, MatchesPanoramas) {
 
 TEST_P(EveryDevice, UsesThreeViews) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
-  Rig rig = render_demo(64).rig;
+  Rig rig = demo_rig(64);
   rig.views.push_back(rig.views[1]);
   rig.views[2].name = "cam2";
   rig.views[2].world_from_camera =
@@ -362,8 +362,7 @@ TEST_P(EveryDevice, RejectsWhatItCannotMatch) {
   Options deep = Options::preset_named("fast");
   deep.levels = 4;
   deep.level_iterations = deep.level_regressions = {1, 1, 1, 1};
-  EXPECT_THROW(Matcher(*device, render_demo(8).rig, deep), Error)
-      << "1 pixel at the coarsest level";
+  EXPECT_THROW(Matcher(*device, demo_rig(8), deep), Error) << "1 pixel at the coarsest level";
   Rig alone = pair.rig;
   alone.views.pop_back();
   EXPECT_THROW(Matcher(*device, alone, options), Error);

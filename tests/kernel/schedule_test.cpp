@@ -40,6 +40,9 @@ TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
       AllOf(HasSubstr("13 views, but 4 pyramid level(s) allow 12"), HasSubstr("--levels 3 ")));
   const Options one_level = Options::preset_named("paper");
   EXPECT_EQ(make_schedule(rig_of(16), one_level).views.size(), 16u);
+  EXPECT_THAT(error_of([&] { make_schedule(rig_of(17), one_level); }),
+              AllOf(HasSubstr("17 views, but 1 pyramid level(s) allow 16"),
+                    ::testing::Not(HasSubstr("--levels"))));
   Rig one = rig_of(2);
   one.views.pop_back();
   EXPECT_THAT(error_of([&] { make_schedule(one, one_level); }), HasSubstr("1 view(s)"));

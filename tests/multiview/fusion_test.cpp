@@ -24,7 +24,7 @@ double from_plane(const CloudPoint& point) {
 class Fusion : public ::testing::Test {
  protected:
   Fusion() {
-    Rig rig = render_demo(side).rig;
+    Rig rig = demo_rig(side);
     rig.views.push_back(rig.views[1]);
     rig.views[2].world_from_camera.translation() *= 2;
     const RenderedPair scene = render_plane(rig, plane_normal, plane_offset);
@@ -160,7 +160,7 @@ TEST_F(Fusion, ViewsThatAreNotComparedWithEachOtherShareTheirPoints) {
 
 /// A wall 2 m ahead of one view and 1 m ahead of the other, where it is four times as fine.
 TEST_F(Fusion, CoarsePointsDoNotStandForFinePixels) {
-  Rig rig = render_demo(side).rig;
+  Rig rig = demo_rig(side);
   rig.views[0].world_from_camera.setIdentity();
   rig.views[1].world_from_camera = Eigen::Translation3d(0, 0, 1);
   const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
@@ -218,7 +218,7 @@ TEST_F(Fusion, SurfacesSeenFromTheirTwoSidesStayApart) {
 /// Of a wall 2 m ahead of one view and 1 m ahead of the other, the nearer one knows four times as
 /// much.
 TEST_F(Fusion, NearViewsCountMore) {
-  Rig rig = render_demo(side).rig;
+  Rig rig = demo_rig(side);
   rig.views[0].world_from_camera.setIdentity();
   rig.views[1].world_from_camera = Eigen::Translation3d(0, 0, 1);
   const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);

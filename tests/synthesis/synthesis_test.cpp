@@ -24,7 +24,7 @@ double grey_at(const cv::Mat& image, const Eigen::Vector2d& u) {
 }
 
 TEST(RenderPlane, TruthIsTheRayPlaneIntersection) {
-  Rig rig = render_demo(64).rig;
+  Rig rig = demo_rig(64);
   rig.views[0].world_from_camera = Eigen::Translation3d(0.3, -0.2, 0.1) *
                                    Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 1, 0).normalized());
   const Eigen::Vector3d normal(0.2, -0.3, 1);
