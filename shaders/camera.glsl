@@ -12,28 +12,71 @@
 #define CAMERA_FIELD_OF_VIEW 6
 #define CAMERA_MEI 7
 #define CAMERA_EQUIRECTANGULAR 8
+#define CAMERA_PINHOLE_RATIONAL 9
+#define CAMERA_THIN_PRISM_FISHEYE 10
+#define CAMERA_RAD_TAN_THIN_PRISM_FISHEYE 11
 
-// std140: five 16-byte rows.
+// std140: six 16-byte rows.
 struct CameraParameters {
   real4 intrinsics;  // fx, fy, cx, cy in pixels
-  // kannala_brandt: k1..k4; double_sphere: xi, alpha, w1; unified, mei: xi, min(xi, 1/xi);
+  // fisheyes, pinhole_rational: k1..k4; double_sphere: xi, alpha, w1; unified, mei: xi, min(xi, 1/xi);
   // extended_unified: alpha, beta, w; field_of_view: omega, 2 tan(omega / 2)
   real4 shape;
-  real4 distortion;  // Brown-Conrady k1, k2, p1, p2
-  // cosine of the field of view's half angle; the largest theta (kannala_brandt) or squared
-  // undistorted radius (radtan) up to which the distortion increases; skew; Brown-Conrady k3
+  real4 distortion;  // radtan: k1, k2, p1, p2; where k1 and k2 are in shape: k5, k6, p1, p2
+  real4 prism;       // s1..s4
+  // cosine of the field of view's half angle; the largest theta (fisheyes) or squared undistorted
+  // radius (others) up to which the distortion increases; skew; radtan: k3
   real4 domain;
   ivec4 size;  // width, height, model, 0
 };
 
-// Brown-Conrady distortion of a point on the normalised plane.
-FN real2 distort(CameraParameters camera, real x, real y, real q) {
-  real radial = real(1) + q * (camera.distortion.x +
-                               q * (camera.distortion.y + q * camera.domain.w));
+FN bool is_fisheye(int model) {
+  return model == CAMERA_KANNALA_BRANDT || model == CAMERA_THIN_PRISM_FISHEYE ||
+         model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE;
+}
+
+// By a rational function, or a fisheye's polynomial, with tangential terms and thin prisms.
+FN bool has_prisms(int model) {
+  return model == CAMERA_PINHOLE_RATIONAL || model == CAMERA_THIN_PRISM_FISHEYE ||
+         model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE;
+}
+
+FN bool is_distorted(int model) {
+  return model == CAMERA_PINHOLE_RADTAN || model == CAMERA_MEI || has_prisms(model);
+}
+
+// Factor of a radius whose square is q: an angle for fisheyes, a length on the normalised plane for others.
+FN real radial_distortion(CameraParameters camera, int model, real q) {
+  if (model == CAMERA_PINHOLE_RADTAN || model == CAMERA_MEI) {
+    return real(1) + q * (camera.distortion.x +
+                          q * (camera.distortion.y + q * camera.domain.w));
+  }
+  if (model == CAMERA_PINHOLE_RATIONAL) {
+    return (real(1) + q * (camera.shape.x + q * (camera.shape.y + q * camera.shape.z))) /
+           (real(1) + q * (camera.shape.w + q * (camera.distortion.x + q * camera.distortion.y)));
+  }
+  real last = camera.shape.w;
+  if (model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) {
+    last = last + q * (camera.distortion.x + q * camera.distortion.y);
+  }
+  return real(1) +
+         q * (camera.shape.x + q * (camera.shape.y + q * (camera.shape.z + q * last)));
+}
+
+// Brown-Conrady distortion, with thin prisms where the model has them, of a point on the normalised plane (of a
+// fisheye: in angles).
+FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
+  real radial = real(1);
+  if (model != CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) radial = radial_distortion(camera, model, q);
   real p1 = camera.distortion.z;
   real p2 = camera.distortion.w;
-  return real2(x * radial + real(2) * p1 * x * y + p2 * (q + real(2) * x * x),
-               y * radial + p1 * (q + real(2) * y * y) + real(2) * p2 * x * y);
+  // A product of its own: of two sums' terms with the factor y Mesa would make one, with other bits.
+  real xy = x * y;
+  real2 distorted = real2(x * radial + real(2) * p1 * xy + p2 * (q + real(2) * x * x),
+                          y * radial + p1 * (q + real(2) * y * y) + real(2) * p2 * xy);
+  if (!has_prisms(model)) return distorted;
+  return real2(distorted.x + q * (camera.prism.x + q * camera.prism.y),
+               distorted.y + q * (camera.prism.z + q * camera.prism.w));
 }
 
 // Projects a direction of any positive length. `model` repeats camera.size.z so that a caller can pass a
@@ -44,15 +87,13 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
   bool inside = d > real(0) && point.z >= camera.domain.x * d;
   real x = real(0);
   real y = real(0);
-  if (model == CAMERA_KANNALA_BRANDT) {
+  if (is_fisheye(model)) {
     real rho = sqrt(rho2);
     real theta = arc_tangent(rho, point.z);
-    real t2 = theta * theta;
-    real distorted =
-        theta *
-        (real(1) +
-         t2 * (camera.shape.x +
-               t2 * (camera.shape.y + t2 * (camera.shape.z + t2 * camera.shape.w))));
+    real distorted = theta;
+    if (model != CAMERA_THIN_PRISM_FISHEYE) {
+      distorted = theta * radial_distortion(camera, model, theta * theta);
+    }
     inside = inside && theta < camera.domain.y;
     real scale = rho > real(0) ? distorted / rho : real(1) / point.z;
     x = point.x * scale;
@@ -87,13 +128,13 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     inside = inside && denominator > real(0);
     x = point.x / denominator;
     y = point.y / denominator;
-    if (model == CAMERA_PINHOLE_RADTAN || model == CAMERA_MEI) {
-      real q = x * x + y * y;
-      inside = inside && q < camera.domain.y;
-      real2 distorted = distort(camera, x, y, q);
-      x = distorted.x;
-      y = distorted.y;
-    }
+  }
+  if (is_distorted(model)) {
+    real q = x * x + y * y;
+    if (!is_fisheye(model)) inside = inside && q < camera.domain.y;
+    real2 distorted = distort(camera, model, x, y, q);
+    x = distorted.x;
+    y = distorted.y;
   }
   pixel = real2(camera.intrinsics.x * x + camera.domain.z * y + camera.intrinsics.z,
                 camera.intrinsics.y * y + camera.intrinsics.w);

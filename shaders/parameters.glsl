@@ -2,7 +2,7 @@
 // What the host tells the kernels: one block for a match, one small block for a dispatch.
 
 // Images that are matched with each other, and views: those at all levels of their pyramids.
-#define MAX_IMAGES 16
+#define MAX_IMAGES 15
 #define MAX_VIEWS 48
 
 // Every image of intensities is surrounded by this many masked pixels, one more than the largest window's radius, so

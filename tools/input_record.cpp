@@ -4,7 +4,6 @@
 #include <chrono>
 #include <opencv2/core.hpp>
 #include <system_error>
-#include <utility>
 
 namespace ws = widestereo;
 using Json = nlohmann::ordered_json;
@@ -18,17 +17,12 @@ Json to_json(const Eigen::Isometry3d& pose) {
 }
 
 Json intrinsics_of(const ws::Camera& camera) {
-  Json intrinsics = {{"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
-  constexpr std::pair<const char*, double ws::Camera::*> others[] = {
-      {"skew", &ws::Camera::skew}, {"xi", &ws::Camera::xi},       {"alpha", &ws::Camera::alpha},
-      {"beta", &ws::Camera::beta}, {"omega", &ws::Camera::omega}, {"k1", &ws::Camera::k1},
-      {"k2", &ws::Camera::k2},     {"k3", &ws::Camera::k3},       {"k4", &ws::Camera::k4},
-      {"p1", &ws::Camera::p1},     {"p2", &ws::Camera::p2}};
+  Json record = {{"fx", camera.fx}, {"fy", camera.fy}, {"cx", camera.cx}, {"cy", camera.cy}};
   const ws::Camera without;
-  for (const auto& [name, member] : others) {
-    if (camera.*member != without.*member) intrinsics[name] = camera.*member;
+  for (const auto& [name, member] : ws::intrinsics()) {
+    if (camera.*member != without.*member) record[name] = camera.*member;
   }
-  return intrinsics;
+  return record;
 }
 
 Json to_json(const ws::View& view) {

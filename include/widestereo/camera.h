@@ -6,6 +6,7 @@
 #include <memory>
 #include <numbers>
 #include <opencv2/core/mat.hpp>
+#include <span>
 #include <string>
 
 namespace widestereo {
@@ -25,7 +26,16 @@ enum class CameraModel : int {
   field_of_view = 6,    ///< omega (Devernay, Faugeras, 2001), with atan2: reaches beyond 90 degrees
   mei = 7,              ///< unified, then Brown-Conrady: OpenCV omnidir, Kalibr omni + radtan
   equirectangular = 8,  ///< (longitude, latitude) = (atan2(x, z), atan2(y, sqrt(x^2 + z^2)))
+  /// pinhole, then OpenCV's distortion with k1..k6, p1 p2 and thin prisms s1..s4
+  pinhole_rational = 9,
+  /// theta, then k1..k4, p1 p2 and s1..s4 of that point: COLMAP, ETH3D (s1, s3: sx1, sy1)
+  thin_prism_fisheye = 10,
+  /// theta (1 + k1 theta^2 + ... + k6 theta^12), then p1 p2 and s1..s4: Project Aria (Fisheye624)
+  rad_tan_thin_prism_fisheye = 11,
 };
+
+/// Number of camera models, which are counted from 0.
+inline constexpr int camera_models = 12;
 
 /// The model's name as used in messages, JSON and --help, for example "kannala_brandt".
 std::string to_string(CameraModel model);
@@ -41,8 +51,11 @@ struct Camera {
   double alpha = 0;                       ///< double_sphere, extended_unified
   double beta = 1;                        ///< extended_unified
   double omega = 0;                       ///< field_of_view, radians
-  double k1 = 0, k2 = 0, k3 = 0, k4 = 0;  ///< kannala_brandt: k1..k4; radtan: k1 k2 (k3)
-  double p1 = 0, p2 = 0;                  ///< tangential part of radtan
+  /// Radial; radtan and mei: k1 k2 (k3); pinhole_rational: k4..k6 of the denominator.
+  double k1 = 0, k2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
+  double p1 = 0, p2 = 0;  ///< tangential, in OpenCV's order: p2 (r^2 + 2 x^2) is of x
+  /// Thin prisms, in OpenCV's order: s1 r^2 + s2 r^4 of x, s3 r^2 + s4 r^4 of y.
+  double s1 = 0, s2 = 0, s3 = 0, s4 = 0;
   /// Half angle of the lens's field of view in radians, measured from +z: rays beyond it are
   /// invalid even where the model would project them (the model's domain is often wider than the
   /// lens).
@@ -50,6 +63,13 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
 };
+
+/// All numbers of a camera but its size and max_theta, by their names.
+struct Intrinsic {
+  const char* name;
+  double Camera::*member;
+};
+std::span<const Intrinsic> intrinsics();
 
 /// An equirectangular image of the whole sphere (twice as wide as high where pixels are square);
 /// the middle column looks along +z.

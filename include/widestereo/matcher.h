@@ -101,7 +101,7 @@ class Matcher {
   using Progress = std::function<void(double)>;
 
   /// Views that a rig may have; with four levels (Options::levels) it is 12.
-  static constexpr int most_views = 16;
+  static constexpr int most_views = 15;
 
   /// Throws Error when the rig or the options are invalid or the device lacks memory or a feature.
   Matcher(Device& device, const Rig& rig, const Options& options);

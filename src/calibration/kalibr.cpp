@@ -114,8 +114,13 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
       return {"omni", with({c.xi}), "radtan", radtan};
     case CameraModel::equirectangular:
       return {"equirectangular", f, "none", {}};
+    case CameraModel::pinhole_rational:
+    case CameraModel::thin_prism_fisheye:
+    case CameraModel::rad_tan_thin_prism_fisheye:
+      break;
   }
-  throw Error("Cannot write " + path.string() + ": unknown camera model.");
+  throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
+              ") has no form in Kalibr's format.");
 }
 
 }  // namespace

@@ -48,8 +48,8 @@ kernel::dual::real4 constant(const kernel::precise::real4& v) {
 }
 
 kernel::dual::CameraParameters constant(const kernel::precise::CameraParameters& p) {
-  return {constant(p.intrinsics), constant(p.shape), constant(p.distortion), constant(p.domain),
-          p.size};
+  return {constant(p.intrinsics), constant(p.shape),  constant(p.distortion),
+          constant(p.prism),      constant(p.domain), p.size};
 }
 
 /// Root of an increasing function on [low, high]: Newton, falling back to bisection.
@@ -67,57 +67,59 @@ double increasing_root(Function value_and_slope, double low, double high, double
   return x;
 }
 
-/// theta with theta (1 + k1 theta^2 + ...) = r, or a negative number beyond the model's limit.
-double kannala_brandt_theta(const kernel::precise::CameraParameters& p, double r) {
-  const std::array<double, 4> k = {p.shape.x, p.shape.y, p.shape.z, p.shape.w};
-  const auto value_and_slope = [&](double theta) {
-    const double t = theta * theta;
-    const double value = theta * (1 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3])))) - r;
-    const double slope = 1 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])));
-    return std::pair(value, slope);
-  };
-  const double limit = p.domain.y;
+/// A radius after radial distortion less `target`, and its slope.
+std::pair<double, double> radial_residual(const kernel::dual::CameraParameters& p, double radius,
+                                          double target) {
+  const Dual r(radius, Eigen::RowVector3d::UnitX());
+  const Dual distorted = r * kernel::dual::radial_distortion(p, p.size.z, r * r);
+  return {distorted.value - target, distorted.derivative.x()};
+}
+
+/// theta whose radially distorted radius is r, or a negative number beyond the model's limit.
+double fisheye_theta(const kernel::dual::CameraParameters& p, double r) {
+  const auto value_and_slope = [&](double theta) { return radial_residual(p, theta, r); };
+  const double limit = p.domain.y.value;
   if (value_and_slope(limit).first < 0) return -1;
   return increasing_root(value_and_slope, 0, limit, r);
 }
 
-/// Distortion of a point on the normalised plane less `target`, with its (symmetric) Jacobian.
+/// End of the domain of distort(), a radius.
+double distortion_limit(const kernel::dual::CameraParameters& p) {
+  const double limit = p.domain.y.value;
+  if (p.size.z == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) return radial_residual(p, limit, 0).first;
+  return kernel::dual::is_fisheye(p.size.z) ? limit : std::sqrt(limit);
+}
+
+/// Distortion of a point on the normalised plane less `target`, with its Jacobian.
 Vector2d distortion_residual(const kernel::dual::CameraParameters& p, const Vector2d& point,
                              const Vector2d& target, Eigen::Matrix2d& jacobian) {
   const Dual x(point.x(), Eigen::RowVector3d::UnitX());
   const Dual y(point.y(), Eigen::RowVector3d::UnitY());
-  const kernel::dual::real2 d = kernel::dual::distort(p, x, y, x * x + y * y);
+  const kernel::dual::real2 d = kernel::dual::distort(p, p.size.z, x, y, x * x + y * y);
   jacobian << d.x.derivative.head<2>(), d.y.derivative.head<2>();
   return Vector2d(d.x.value, d.y.value) - target;
 }
 
 /// Radius whose radial distortion alone has the length `norm`, or the end of the domain.
-double undistorted_radius(const kernel::precise::CameraParameters& p, double norm) {
-  const double k1 = p.distortion.x;
-  const double k2 = p.distortion.y;
-  const double k3 = p.domain.w;
-  const auto value_and_slope = [&](double r) {
-    const double q = r * r;
-    return std::pair(r * (1 + q * (k1 + q * (k2 + q * k3))) - norm,
-                     1 + q * (3 * k1 + q * (5 * k2 + q * 7 * k3)));
-  };
-  const double largest = std::sqrt(p.domain.y);
+double undistorted_radius(const kernel::dual::CameraParameters& p, double norm, double largest) {
+  if (p.size.z == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) return std::min(norm, largest);
+  const auto value_and_slope = [&](double r) { return radial_residual(p, r, norm); };
   double high = std::min(largest, std::max(1.0, 2 * norm));
   while (high < largest && value_and_slope(high).first < 0) high = std::min(largest, 2 * high);
   return increasing_root(value_and_slope, 0, high, norm);
 }
 
-/// Inverts the Brown-Conrady distortion of a point in place; false outside the increasing part.
-bool undistort(const kernel::precise::CameraParameters& p, Vector2d& point) {
-  const kernel::dual::CameraParameters dual = constant(p);
+/// Inverts distort() of a point in place; false outside the increasing part.
+bool undistort(const kernel::dual::CameraParameters& p, Vector2d& point) {
   const Vector2d target = point;
   const double norm = target.norm();
+  const double limit = distortion_limit(p);
   // The Jacobian is singular at the end of the domain: start inside it.
-  const double start = std::min(undistorted_radius(p, norm), 0.999 * std::sqrt(p.domain.y));
+  const double start = std::min(undistorted_radius(p, norm, limit), 0.999 * limit);
   if (norm > 0) point = target * (start / norm);
 
   Eigen::Matrix2d jacobian;
-  Vector2d residual = distortion_residual(dual, point, target, jacobian);
+  Vector2d residual = distortion_residual(p, point, target, jacobian);
   for (int i = 0; i < 50 && residual.norm() > 1e-15 * (1 + norm); ++i) {
     const Vector2d step = -jacobian.inverse() * residual;
     if (!step.allFinite()) return false;
@@ -127,33 +129,33 @@ bool undistort(const kernel::precise::CameraParameters& p, Vector2d& point) {
     Vector2d next_residual;
     do {
       next = point + scale * step;
-      next_residual = distortion_residual(dual, next, target, jacobian);
+      next_residual = distortion_residual(p, next, target, jacobian);
       scale *= 0.5;
-    } while (scale > 1e-4 &&
-             (next.squaredNorm() >= p.domain.y || next_residual.norm() > residual.norm()));
+    } while (scale > 1e-4 && (next.norm() >= limit || next_residual.norm() > residual.norm()));
     const bool improved = next_residual.norm() < residual.norm();
     if (!improved) break;
     point = next;
     residual = next_residual;
   }
-  return point.squaredNorm() < p.domain.y;
+  return point.norm() < limit;
 }
 
 /// Direction (any length) of a point on the model's normalised plane, before checking the domain.
-bool direction_of(const Camera& c, const kernel::precise::CameraParameters& p, Vector2d m,
+bool direction_of(const Camera& c, const kernel::dual::CameraParameters& p, Vector2d m,
                   Vector3d& direction) {
-  if (c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei) {
-    if (!undistort(p, m)) return false;
-  }
+  if (kernel::dual::is_distorted(p.size.z) && !undistort(p, m)) return false;
   const double r2 = m.squaredNorm();
   const double r = std::sqrt(r2);
   switch (c.model) {
     case CameraModel::pinhole:
     case CameraModel::pinhole_radtan:
+    case CameraModel::pinhole_rational:
       direction = m.homogeneous();
       return true;
-    case CameraModel::kannala_brandt: {
-      const double theta = kannala_brandt_theta(p, r);
+    case CameraModel::kannala_brandt:
+    case CameraModel::thin_prism_fisheye:
+    case CameraModel::rad_tan_thin_prism_fisheye: {
+      const double theta = c.model == CameraModel::thin_prism_fisheye ? r : fisheye_theta(p, r);
       if (theta < 0) return false;
       direction << (r > 0 ? std::sin(theta) / r : 1.0) * m, std::cos(theta);
       return true;
@@ -198,11 +200,12 @@ bool direction_of(const Camera& c, const kernel::precise::CameraParameters& p, V
 }
 
 bool unproject_with(const Camera& c, const kernel::precise::CameraParameters& p,
-                    const Vector2d& pixel, Vector3d& ray) {
+                    const kernel::dual::CameraParameters& dual, const Vector2d& pixel,
+                    Vector3d& ray) {
   Vector2d m;
   m.y() = (pixel.y() - c.cy) / c.fy;
   m.x() = (pixel.x() - c.cx - c.skew * m.y()) / c.fx;
-  if (!direction_of(c, p, m, ray)) return false;
+  if (!direction_of(c, dual, m, ray)) return false;
   ray.normalize();
   // Projecting back checks the domain and the field of view and catches every way of not
   // converging.
@@ -218,16 +221,28 @@ std::string size_text(int width, int height) {
 }  // namespace
 
 std::string to_string(CameraModel model) {
-  static const std::array<const char*, 9> names = {
-      "pinhole",        "pinhole_radtan",   "kannala_brandt", "double_sphere",
-      "unified",        "extended_unified", "field_of_view",  "mei",
-      "equirectangular"};
+  static const std::array<const char*, camera_models> names = {
+      "pinhole",         "pinhole_radtan",   "kannala_brandt",     "double_sphere",
+      "unified",         "extended_unified", "field_of_view",      "mei",
+      "equirectangular", "pinhole_rational", "thin_prism_fisheye", "rad_tan_thin_prism_fisheye"};
   const auto index = static_cast<std::size_t>(model);
   if (index >= names.size()) {
     throw Error("The camera model number " + std::to_string(static_cast<int>(model)) +
                 " is unknown; use one of CameraModel.");
   }
   return names[index];
+}
+
+std::span<const Intrinsic> intrinsics() {
+  using C = Camera;
+  static constexpr Intrinsic all[] = {
+      {"fx", &C::fx},       {"fy", &C::fy}, {"cx", &C::cx},       {"cy", &C::cy},
+      {"skew", &C::skew},   {"xi", &C::xi}, {"alpha", &C::alpha}, {"beta", &C::beta},
+      {"omega", &C::omega}, {"k1", &C::k1}, {"k2", &C::k2},       {"k3", &C::k3},
+      {"k4", &C::k4},       {"k5", &C::k5}, {"k6", &C::k6},       {"p1", &C::p1},
+      {"p2", &C::p2},       {"s1", &C::s1}, {"s2", &C::s2},       {"s3", &C::s3},
+      {"s4", &C::s4}};
+  return all;
 }
 
 Camera whole_sphere(int width, int height) {
@@ -273,7 +288,8 @@ bool PreparedCamera::project(const Vector3d& point, Vector2d& pixel,
 }
 
 bool PreparedCamera::unproject(const Vector2d& pixel, Vector3d& ray) const {
-  return unproject_with(implementation_->camera, implementation_->parameters, pixel, ray);
+  return unproject_with(implementation_->camera, implementation_->parameters, implementation_->dual,
+                        pixel, ray);
 }
 
 bool PreparedCamera::project_into_image(const Vector3d& point, Vector2d& pixel) const {
@@ -334,13 +350,14 @@ cv::Mat ray_image(const Camera& camera, const cv::Mat& mask) {
   Camera whole = camera;
   whole.max_theta = std::numbers::pi;
   const kernel::precise::CameraParameters model = camera_parameters(whole);
+  const kernel::dual::CameraParameters dual = constant(model);
   const double cosine = camera_parameters(camera).domain.x;
   cv::Mat rays = cv::Mat::zeros(camera.height, camera.width, CV_32FC4);
   cv::parallel_for_(cv::Range(0, camera.height), [&](const cv::Range& rows) {
     for (int y = rows.start; y < rows.end; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         Vector3d ray;
-        if (!unproject_with(whole, model, {x, y}, ray)) continue;
+        if (!unproject_with(whole, model, dual, {x, y}, ray)) continue;
         const bool usable = ray.z() >= cosine && (mask.empty() || mask.at<uchar>(y, x) != 0);
         const Eigen::Vector3f single = ray.cast<float>();
         rays.at<cv::Vec4f>(y, x) = {single.x(), single.y(), single.z(), usable ? 1.0f : 0.0f};

@@ -2,7 +2,6 @@
 #include "geometry/validation.h"
 
 #include <Eigen/Dense>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <sstream>
@@ -24,27 +23,13 @@ void require(bool good, const std::string& name, const std::string& what, double
 }
 
 void require_finite(const Camera& c, const std::string& name) {
-  const std::array<std::pair<const char*, double>, 16> values = {{{"fx", c.fx},
-                                                                  {"fy", c.fy},
-                                                                  {"cx", c.cx},
-                                                                  {"cy", c.cy},
-                                                                  {"skew", c.skew},
-                                                                  {"xi", c.xi},
-                                                                  {"alpha", c.alpha},
-                                                                  {"beta", c.beta},
-                                                                  {"omega", c.omega},
-                                                                  {"k1", c.k1},
-                                                                  {"k2", c.k2},
-                                                                  {"k3", c.k3},
-                                                                  {"k4", c.k4},
-                                                                  {"p1", c.p1},
-                                                                  {"p2", c.p2},
-                                                                  {"max_theta", c.max_theta}}};
-  for (const auto& [what, value] : values) {
+  const auto check = [&name](const char* what, double value) {
     // Far beyond any calibration, yet safe to square in single precision.
     require(std::isfinite(value) && std::abs(value) < 1e9, name, what, value,
             "it must be a finite number of ordinary size");
-  }
+  };
+  for (const auto& [what, member] : intrinsics()) check(what, c.*member);
+  check("max_theta", c.max_theta);
 }
 
 void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
@@ -77,6 +62,9 @@ void validate(const Camera& c, const std::string& name) {
     case CameraModel::pinhole_radtan:
     case CameraModel::kannala_brandt:
     case CameraModel::equirectangular:
+    case CameraModel::pinhole_rational:
+    case CameraModel::thin_prism_fisheye:
+    case CameraModel::rad_tan_thin_prism_fisheye:
       break;
     case CameraModel::double_sphere:
       require(c.xi > -1 && c.xi <= 1, name, "xi", c.xi, "a double sphere needs it in (-1, 1]");

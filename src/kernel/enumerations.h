@@ -18,6 +18,10 @@ static_assert(CAMERA_EXTENDED_UNIFIED == static_cast<int>(CameraModel::extended_
 static_assert(CAMERA_FIELD_OF_VIEW == static_cast<int>(CameraModel::field_of_view));
 static_assert(CAMERA_MEI == static_cast<int>(CameraModel::mei));
 static_assert(CAMERA_EQUIRECTANGULAR == static_cast<int>(CameraModel::equirectangular));
+static_assert(CAMERA_PINHOLE_RATIONAL == static_cast<int>(CameraModel::pinhole_rational));
+static_assert(CAMERA_THIN_PRISM_FISHEYE == static_cast<int>(CameraModel::thin_prism_fisheye));
+static_assert(CAMERA_RAD_TAN_THIN_PRISM_FISHEYE ==
+              static_cast<int>(CameraModel::rad_tan_thin_prism_fisheye));
 
 static_assert(MAX_IMAGES == Matcher::most_views);
 

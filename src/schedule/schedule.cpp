@@ -20,10 +20,10 @@ constexpr int right_and_down = NEIGHBOUR_RIGHT | NEIGHBOUR_DOWN;
 constexpr int all_neighbours = left_and_up | right_and_down;
 
 // The blocks are uploaded as they are: their layout must be std140 (parameters) and std430 (pass).
-static_assert(sizeof(kernel::CameraParameters) == 80);
+static_assert(sizeof(kernel::CameraParameters) == 96);
 static_assert(sizeof(kernel::ViewPair) == 48);
 static_assert(offsetof(kernel::MatchParameters, cameras) == 96);
-static_assert(offsetof(kernel::MatchParameters, pairs) == 96 + 80 * MAX_VIEWS);
+static_assert(offsetof(kernel::MatchParameters, pairs) == 96 + 96 * MAX_VIEWS);
 static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
 static_assert(sizeof(kernel::PassParameters) == 64);
 

@@ -32,13 +32,24 @@ int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) 
 int projection(int model) {
   constexpr int common = 7;       // the length, and the field of view's limit
   constexpr int perspective = 2;  // two divisions
-  constexpr int distortion = 29;
+  constexpr int decentring = 22;
+  constexpr int radial = 6;
+  constexpr int rational = 13;
+  constexpr int prisms = 8;
+  constexpr int fisheye = 5;
+  constexpr int radial_of_fisheye = 8;
   constexpr int to_pixels = 6;
   switch (static_cast<CameraModel>(model)) {
     case CameraModel::pinhole_radtan:
-      return common + perspective + distortion + to_pixels;
+      return common + perspective + radial + decentring + to_pixels;
+    case CameraModel::pinhole_rational:
+      return common + perspective + rational + decentring + prisms + to_pixels;
     case CameraModel::kannala_brandt:
-      return common + 15 + to_pixels;
+      return common + fisheye + radial_of_fisheye + 2 + to_pixels;
+    case CameraModel::thin_prism_fisheye:
+      return common + fisheye + radial_of_fisheye + decentring + prisms + to_pixels;
+    case CameraModel::rad_tan_thin_prism_fisheye:
+      return common + fisheye + radial_of_fisheye + 6 + decentring + prisms + to_pixels;
     case CameraModel::double_sphere:
       return common + 10 + perspective + to_pixels;
     case CameraModel::unified:
@@ -48,7 +59,7 @@ int projection(int model) {
     case CameraModel::field_of_view:
       return common + 7 + to_pixels;
     case CameraModel::mei:
-      return common + 3 + perspective + distortion + to_pixels;
+      return common + 3 + perspective + radial + decentring + to_pixels;
     case CameraModel::equirectangular:
       return common + 7 + to_pixels;
     case CameraModel::pinhole:

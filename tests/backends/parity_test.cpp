@@ -205,6 +205,53 @@ TEST_P(Parity, ExactFilteringGivesTheBitsOfTheCpu) {
   }
 }
 
+/// Two cameras of the demo's room whose lens has every coefficient of the model.
+Rig rig_of_model(CameraModel model, int size) {
+  Rig rig = demo_rig(size);
+  for (View& view : rig.views) {
+    Camera& c = view.camera;
+    c.model = model;
+    c.fx = c.fy = 0.45 * size;
+    c.xi = 0.4;
+    c.alpha = 0.6;
+    c.beta = 1.1;
+    c.omega = 0.9;
+    c.k1 = 0.05;
+    c.k2 = -0.02;
+    c.k3 = 0.01;
+    c.k4 = 0.02;
+    c.k5 = -0.01;
+    c.k6 = 0.002;
+    c.p1 = 0.001;
+    c.p2 = -0.003;
+    c.s1 = 0.004;
+    c.s2 = -0.002;
+    c.s3 = -0.005;
+    c.s4 = 0.001;
+  }
+  return rig;
+}
+
+TEST_P(Parity, EveryCameraModelGivesTheBitsOfTheCpu) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  if (const std::string why = why_bits_may_differ(*device); !why.empty()) GTEST_SKIP() << why;
+  Device cpu = Device::open("cpu");
+  for (int model = 0; model < camera_models; ++model) {
+    SCOPED_TRACE(to_string(static_cast<CameraModel>(model)));
+    const RenderedPair pair = render_demo_room(rig_of_model(static_cast<CameraModel>(model), 64));
+    Options options = exact(Options::preset_named("paper"));
+    std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+    options.window_radius = 2;
+    options.first_iterations = 1;
+    options.second_iterations = 0;
+    const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
+    const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
+    EXPECT_GT(cv::countNonZero(expected.views[0].cost < 1), 1000);
+    expect_same_bits(expected.views[0], actual.views[0]);
+  }
+  expect_no_validation_messages(*device);
+}
+
 // Back ends number the views of all levels, and have memory of many sizes.
 TEST_P(Parity, SixViewsOfTwoSizesGiveTheBitsOfTheCpu) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
@@ -298,6 +345,25 @@ TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
         evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
                  rig.views[1 - view]);
     EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.2) << to_table(scores);
+  }
+  expect_no_validation_messages(*device);
+}
+
+// By kernels that know no model beforehand.
+TEST_P(EveryDevice, MatchesLensesWithPrisms) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Rig rig = rig_of_model(CameraModel::thin_prism_fisheye, 96);
+  rig.views[1].camera = rig_of_model(CameraModel::rad_tan_thin_prism_fisheye, 96).views[1].camera;
+  const RenderedPair pair = render_demo_room(rig);
+  Options options = Options::preset_named("fast");
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  options.regression_radius = 12;
+  const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
+  for (int view = 0; view < 2; ++view) {
+    const std::vector<RegionScores> scores =
+        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
+                 rig.views[1 - view]);
+    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.05) << to_table(scores);
   }
   expect_no_validation_messages(*device);
 }

@@ -123,6 +123,55 @@ std::vector<NamedCamera> cameras() {
   list.push_back({"panorama", whole_sphere(1024, 512)});
   list.push_back(
       {"part_of_a_panorama", make(CameraModel::equirectangular, 600, 300, 210, 205, 250.5, 170)});
+
+  c = make(CameraModel::pinhole_rational, 640, 480, 380, 381, 322, 241);
+  c.k1 = 0.51;
+  c.k2 = -2.61;
+  c.k3 = 1.52;
+  c.k4 = 0.39;
+  c.k5 = -2.43;
+  c.k6 = 1.45;
+  c.p1 = 0.0006;
+  c.p2 = -0.0002;
+  list.push_back({"rational", c});
+  c.s1 = -0.0013;
+  c.s2 = 0.0004;
+  c.s3 = 0.0021;
+  c.s4 = -0.0003;
+  c.k1 = 0.4;
+  c.k2 = c.k3 = c.k5 = c.k6 = 0;
+  c.k4 = 0.9;
+  list.push_back({"rational_with_prisms", c});
+
+  // ETH3D's courtyard, at a quarter.
+  c = make(CameraModel::thin_prism_fisheye, 1512, 1008, 852.855, 852.505, 759.82, 503.02);
+  c.k1 = 0.21047;
+  c.k2 = 0.21102;
+  c.k3 = -0.158023;
+  c.k4 = 0.406856;
+  c.p1 = -5.36231e-06;
+  c.p2 = 0.00051541;
+  c.s1 = -8.46499e-05;
+  c.s3 = 0.000861313;
+  list.push_back({"eth3d_thin_prism", c});
+
+  // Of Aria Synthetic Environments, which has no prisms, and with some.
+  c = make(CameraModel::rad_tan_thin_prism_fisheye, 704, 704, 297.6375381, 297.6375381, 357.6599197,
+           349.1922497);
+  c.k1 = 0.3650890375644368;
+  c.k2 = -0.1738082418112771;
+  c.k3 = -0.7534945484033189;
+  c.k4 = 2.434788882752295;
+  c.k5 = -2.57786220300886;
+  c.k6 = 0.8788483538598834;
+  c.p2 = 0.0008005198595407136;
+  c.p1 = -0.000294237814554143;
+  list.push_back({"aria_fisheye624", c});
+  c.s1 = -0.0011;
+  c.s2 = 0.0002;
+  c.s3 = 0.0007;
+  c.s4 = -0.0004;
+  list.push_back({"aria_fisheye624_with_prisms", c});
   return list;
 }
 
@@ -156,7 +205,7 @@ TEST_P(EveryCamera, RoundTripOverTheWholeDomain) {
       ++checked;
     }
   }
-  EXPECT_GT(checked, 3000);
+  EXPECT_GT(checked, 2500);
 }
 
 TEST_P(EveryCamera, PixelsRoundTrip) {
@@ -339,6 +388,101 @@ TEST(OpenCvAgreement, PinholeRadtan) {
   }
 }
 
+TEST(OpenCvAgreement, Rational) {
+  int compared = 0;
+  for (const NamedCamera& named : cameras()) {
+    const Camera& c = named.camera;
+    if (c.model != CameraModel::pinhole_rational) continue;
+    const std::vector<cv::Point3d> points = random_points(std::min(0.8, 0.97 * model_max_theta(c)));
+    std::vector<cv::Point2d> pixels;
+    cv::projectPoints(
+        points, cv::Vec3d(), cv::Vec3d(), matrix_of(c),
+        std::vector<double>{c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5, c.k6, c.s1, c.s2, c.s3, c.s4},
+        pixels);
+    expect_equal_projections(c, points, pixels);
+    ++compared;
+  }
+  EXPECT_EQ(compared, 2);
+}
+
+/// Radial polynomial of an angle.
+double polynomial(const std::vector<double>& k, double theta) {
+  double sum = 1;
+  double power = 1;
+  for (const double coefficient : k) sum += coefficient * (power *= theta * theta);
+  return sum;
+}
+
+/// As Project Aria's documentation writes tangential distortion, with p = (p0, p1), and prisms.
+Vector2d decentred(const Vector2d& radial, const Vector2d& at, const Camera& c) {
+  const Vector2d p(c.p2, c.p1);
+  const double r2 = at.squaredNorm();
+  return radial + 2 * at.dot(p) * at + r2 * p +
+         Vector2d(c.s1 * r2 + c.s2 * r2 * r2, c.s3 * r2 + c.s4 * r2 * r2);
+}
+
+/// The point on the normalised plane of models with prisms, as their authors write them.
+Vector2d literal_with_prisms(const Camera& c, double theta, double azimuth) {
+  const Vector2d unit(std::cos(azimuth), std::sin(azimuth));
+  if (c.model == CameraModel::pinhole_rational) {
+    const Vector2d at = std::tan(theta) * unit;
+    const double q = at.squaredNorm();
+    const double factor = (1 + c.k1 * q + c.k2 * q * q + c.k3 * q * q * q) /
+                          (1 + c.k4 * q + c.k5 * q * q + c.k6 * q * q * q);
+    return decentred(factor * at, at, c);
+  }
+  const Vector2d angle = theta * unit;
+  if (c.model == CameraModel::thin_prism_fisheye) {
+    return decentred(polynomial({c.k1, c.k2, c.k3, c.k4}, theta) * angle, angle, c);
+  }
+  const Vector2d radial = polynomial({c.k1, c.k2, c.k3, c.k4, c.k5, c.k6}, theta) * angle;
+  return decentred(radial, radial, c);
+}
+
+TEST(ModelFormulas, PrismsActOnTheirOwnModelsPoint) {
+  int compared = 0;
+  for (const NamedCamera& named : cameras()) {
+    const Camera& c = named.camera;
+    if (c.model < CameraModel::pinhole_rational) continue;
+    for (int i = 1; i < 40; ++i) {
+      const double theta = 0.97 * model_max_theta(c) * i / 40;
+      const double azimuth = 0.7 * i;
+      const Vector2d m = literal_with_prisms(c, theta, azimuth);
+      Vector2d pixel;
+      ASSERT_TRUE(project(c, 2.5 * direction(theta, azimuth), pixel));
+      const Vector2d expected(c.fx * m.x() + c.cx, c.fy * m.y() + c.cy);
+      EXPECT_LT((pixel - expected).norm(), 1e-12 * (1000 + expected.norm())) << named.name;
+      ++compared;
+    }
+  }
+  EXPECT_EQ(compared, 5 * 39);
+}
+
+TEST(ModelRelations, ModelsWithPrismsContainThoseWithout) {
+  for (const NamedCamera& named : cameras()) {
+    const Camera& plain = named.camera;
+    std::vector<CameraModel> larger;
+    if (plain.model == CameraModel::kannala_brandt) {
+      larger = {CameraModel::thin_prism_fisheye, CameraModel::rad_tan_thin_prism_fisheye};
+    } else if (plain.model == CameraModel::pinhole_radtan) {
+      larger = {CameraModel::pinhole_rational};
+    }
+    for (const CameraModel model : larger) {
+      Camera camera = plain;
+      camera.model = model;
+      EXPECT_NEAR(model_max_theta(camera), model_max_theta(plain), 1e-9) << named.name;
+      for (int i = 0; i < 50; ++i) {
+        const Vector3d point = direction(0.99 * model_max_theta(plain) * i / 50, 0.3 * i);
+        Vector2d expected;
+        Vector2d pixel;
+        ASSERT_TRUE(project(plain, point, expected));
+        ASSERT_TRUE(project(camera, point, pixel));
+        EXPECT_LT((pixel - expected).norm(), 1e-9 * (1 + expected.norm())) << named.name;
+      }
+    }
+  }
+}
+
 TEST(ModelRelations, UnifiedIsDoubleSphereAndExtendedUnifiedInDisguise) {
   Camera unified = make(CameraModel::unified, 512, 512, 300, 300, 256, 256);
   unified.xi = 1.5;
@@ -466,6 +610,51 @@ TEST(ModelLimits, BrownConradyEndsWhereItsJacobianBecomesSingular) {
   EXPECT_GT(folding, 10);
 }
 
+TEST(ModelLimits, PrismsEndBeforeTheirJacobianBecomesSingular) {
+  std::mt19937 random(14);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int folding = 0;
+  for (const CameraModel model : {CameraModel::pinhole_rational, CameraModel::thin_prism_fisheye,
+                                  CameraModel::rad_tan_thin_prism_fisheye}) {
+    for (int i = 0; i < 20; ++i) {
+      Camera c = make(model, 640, 480, 1, 1, 0, 0);
+      for (double Camera::*k : {&Camera::k1, &Camera::k2, &Camera::k4, &Camera::k5}) {
+        c.*k = 0.3 * unit(random);
+      }
+      c.k3 = c.k6 = 0.05 * unit(random);
+      for (double Camera::*small :
+           {&Camera::p1, &Camera::p2, &Camera::s1, &Camera::s2, &Camera::s3, &Camera::s4}) {
+        c.*small = 2e-3 * unit(random);
+      }
+      const double end = model == CameraModel::pinhole_rational ? 1.5 : std::numbers::pi;
+      double first = end;
+      for (int j = 0; j < 24; ++j) {
+        const double azimuth = j * 15 * degree;
+        // Along and across the azimuth.
+        const auto determinant = [&](double theta) {
+          constexpr double h = 1e-6;
+          const Vector2d along = literal_with_prisms(c, theta + h, azimuth) -
+                                 literal_with_prisms(c, theta - h, azimuth);
+          const Vector2d across = literal_with_prisms(c, theta, azimuth + h) -
+                                  literal_with_prisms(c, theta, azimuth - h);
+          return along.x() * across.y() - along.y() * across.x();
+        };
+        first = std::min(first, first_negative(determinant, first));
+      }
+      const double limit = model_max_theta(c);
+      if (first == end) {
+        EXPECT_GT(limit, 0.999 * end) << to_string(model);
+        continue;
+      }
+      // Sampling finds the end slightly late; the bound may be reached slightly early.
+      EXPECT_LT(limit, first + 1e-9) << to_string(model);
+      EXPECT_GT(limit, 0.98 * first) << to_string(model);
+      ++folding;
+    }
+  }
+  EXPECT_GT(folding, 30);
+}
+
 /// A random camera of the model with parameters from its whole valid range.
 Camera random_camera(CameraModel model, std::mt19937& random) {
   std::uniform_real_distribution<double> unit(0, 1);
@@ -507,6 +696,19 @@ Camera random_camera(CameraModel model, std::mt19937& random) {
       break;
     case CameraModel::equirectangular:
       break;
+    case CameraModel::pinhole_rational:
+    case CameraModel::thin_prism_fisheye:
+    case CameraModel::rad_tan_thin_prism_fisheye:
+      for (double Camera::*k : {&Camera::k1, &Camera::k2, &Camera::k4, &Camera::k5}) {
+        c.*k = 0.1 * sign(random);
+      }
+      c.k3 = 0.03 * sign(random);
+      c.k6 = 0.03 * sign(random);
+      for (double Camera::*small :
+           {&Camera::p1, &Camera::p2, &Camera::s1, &Camera::s2, &Camera::s3, &Camera::s4}) {
+        c.*small = 2e-3 * sign(random);
+      }
+      break;
   }
   return c;
 }
@@ -514,7 +716,7 @@ Camera random_camera(CameraModel model, std::mt19937& random) {
 TEST(RandomCameras, RoundTripUpToTheEdgeOfTheDomain) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
-  for (int model = 0; model < 9; ++model) {
+  for (int model = 0; model < camera_models; ++model) {
     int checked = 0;
     for (int i = 0; i < 100; ++i) {
       const Camera camera = random_camera(static_cast<CameraModel>(model), random);
@@ -644,9 +846,9 @@ TEST(RayImage, RefusesWhatDoesNotFit) {
 
 TEST(ModelNames, AreDistinctAndUnknownModelsRefused) {
   std::set<std::string> names;
-  for (int i = 0; i < 9; ++i) names.insert(to_string(static_cast<CameraModel>(i)));
-  EXPECT_EQ(names.size(), 9U);
-  EXPECT_THROW(to_string(static_cast<CameraModel>(9)), Error);
+  for (int i = 0; i < camera_models; ++i) names.insert(to_string(static_cast<CameraModel>(i)));
+  EXPECT_EQ(names.size(), std::size_t{camera_models});
+  EXPECT_THROW(to_string(static_cast<CameraModel>(camera_models)), Error);
   EXPECT_THROW(to_string(static_cast<CameraModel>(-1)), Error);
 }
 

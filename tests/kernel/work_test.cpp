@@ -18,6 +18,7 @@ Camera camera_of(CameraModel model) {
   camera.alpha = 0.59;
   camera.beta = 1.1;
   camera.omega = 0.9;
+  camera.k4 = 0.01;
   return camera;
 }
 
@@ -39,7 +40,7 @@ counting::Counts run_patch(const Options& options, CameraModel model) {
 }
 
 TEST(Work, OfAPatchIsWhatRunningItTakes) {
-  for (int model = 0; model < 9; ++model) {
+  for (int model = 0; model < camera_models; ++model) {
     for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
       for (const double weight_scale : {0.0, 12.0}) {
         for (const PatchPattern pattern : {PatchPattern::dense, PatchPattern::checkerboard}) {
