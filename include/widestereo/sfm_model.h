@@ -49,8 +49,7 @@ class SfmModel {
   /// Calibration and poses of images, validated; views are named as the images are. The world frame
   /// and the unit of length are the reconstruction's: metres only where it was scaled to them.
   /// Pixel centres, at half pixels there, are moved to whole ones. Views have the masks that a
-  /// transforms.json names. Throws Error, also for camera models that have no equivalent here (thin
-  /// prisms, division, equirectangular).
+  /// transforms.json names. Throws Error, also for division models of pincushion distortion.
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const;
 
   /// The same of the images of files.

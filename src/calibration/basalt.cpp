@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <utility>
 
 #include "calibration/formats.h"
 #include "widestereo/error.h"
@@ -16,6 +17,13 @@ using Json = nlohmann::ordered_json;
 
 /// Extra key of ours: half angles of the fields of view in degrees, one for each camera.
 constexpr const char* max_theta_key = "max_theta_deg";
+
+/// As headsets of Windows Mixed Reality have it.
+constexpr const char* radtan8 = "pinhole-radtan8";
+constexpr std::pair<const char*, double Camera::*> radtan8_coefficients[] = {
+    {"k1", &Camera::k1}, {"k2", &Camera::k2}, {"p1", &Camera::p1}, {"p2", &Camera::p2},
+    {"k3", &Camera::k3}, {"k4", &Camera::k4}, {"k5", &Camera::k5}, {"k6", &Camera::k6}};
+constexpr const char* largest_radius_key = "rpmax";
 
 double number(const Document& document, const Json& object, const std::string& key) {
   if (!object.is_object() || !object.contains(key) || !object.at(key).is_number()) {
@@ -67,11 +75,17 @@ Camera read_camera(const Document& document, const Json& entry) {
     camera.omega = value("w");
   } else if (type == "pinhole") {
     camera.model = CameraModel::pinhole;
+  } else if (type == radtan8) {
+    camera.model = CameraModel::pinhole_rational;
+    for (const auto& [key, member] : radtan8_coefficients) camera.*member = value(key);
+    // Of points on the normalised plane; 0: none.
+    const double largest_radius = value(largest_radius_key);
+    if (largest_radius > 0) camera.max_theta = std::atan(largest_radius);
   } else {
     document.fail("The camera_type \"" + type +
-                  "\" is unknown; use ds, eucm, ucm, kb4, fov or pinhole.");
+                  "\" is unknown; use ds, eucm, ucm, kb4, fov, pinhole or " + radtan8 + ".");
   }
-  return camera;
+  return simplified(camera);
 }
 
 Eigen::Isometry3d read_pose(const Document& document, const Json& entry) {
@@ -96,8 +110,9 @@ Json basalt_form(const View& view, const std::filesystem::path& path) {
   const Camera& c = view.camera;
   const double f = c.model == CameraModel::unified ? 1 / (1 + c.xi) : 1;
   Json values = {{"fx", c.fx * f}, {"fy", c.fy * f}, {"cx", c.cx}, {"cy", c.cy}};
+  const bool has_form = c.skew == 0 && c.s1 == 0 && c.s2 == 0 && c.s3 == 0 && c.s4 == 0;
   std::string type;
-  switch (c.skew != 0 ? CameraModel::mei : c.model) {
+  switch (has_form ? c.model : CameraModel::mei) {
     case CameraModel::double_sphere:
       type = "ds";
       values["xi"] = c.xi;
@@ -125,6 +140,12 @@ Json basalt_form(const View& view, const std::filesystem::path& path) {
       break;
     case CameraModel::pinhole:
       type = "pinhole";
+      break;
+    case CameraModel::pinhole_radtan:
+    case CameraModel::pinhole_rational:
+      type = radtan8;
+      for (const auto& [key, member] : radtan8_coefficients) values[key] = c.*member;
+      values[largest_radius_key] = c.max_theta < std::numbers::pi / 2 ? std::tan(c.max_theta) : 0;
       break;
     default:
       throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "calibration/formats.h"
 #include "widestereo/error.h"
 
 namespace widestereo::calibration {
@@ -10,7 +11,6 @@ namespace widestereo::calibration {
 const std::vector<ColmapModel>& colmap_models() {
   using enum CameraModel;
   using C = Camera;
-  constexpr double C::*zero = nullptr;
   static const std::vector<ColmapModel> models = {
       {"SIMPLE_PINHOLE", 1, pinhole, {}},
       {"PINHOLE", 2, pinhole, {}},
@@ -20,18 +20,24 @@ const std::vector<ColmapModel>& colmap_models() {
       {"OPENCV_FISHEYE", 2, kannala_brandt, {&C::k1, &C::k2, &C::k3, &C::k4}},
       {"FULL_OPENCV",
        2,
-       pinhole_radtan,
-       {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, zero, zero, zero}},
+       pinhole_rational,
+       {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, &C::k4, &C::k5, &C::k6}},
       {"FOV", 2, field_of_view, {&C::omega}},
       {"SIMPLE_RADIAL_FISHEYE", 1, kannala_brandt, {&C::k1}},
       {"RADIAL_FISHEYE", 1, kannala_brandt, {&C::k1, &C::k2}},
       {"THIN_PRISM_FISHEYE",
        2,
-       kannala_brandt,
-       {&C::k1, &C::k2, zero, zero, &C::k3, &C::k4, zero, zero}},
-      {"RAD_TAN_THIN_PRISM_FISHEYE", 2, {}, std::vector<double C::*>(12, zero)},
-      {"SIMPLE_DIVISION", 1, {}, {zero}},
-      {"DIVISION", 2, {}, {zero}},
+       thin_prism_fisheye,
+       {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, &C::k4, &C::s1, &C::s3}},
+      // Its p0, which is of x, is what others call p2.
+      {"RAD_TAN_THIN_PRISM_FISHEYE",
+       2,
+       rad_tan_thin_prism_fisheye,
+       {&C::k1, &C::k2, &C::k3, &C::k4, &C::k5, &C::k6, &C::p2, &C::p1, &C::s1, &C::s2, &C::s3,
+        &C::s4}},
+      // k, of which beta is -4.
+      {"SIMPLE_DIVISION", 1, extended_unified, {&C::beta}},
+      {"DIVISION", 2, extended_unified, {&C::beta}},
       {"SIMPLE_FISHEYE", 1, kannala_brandt, {}},
       {"FISHEYE", 2, kannala_brandt, {}},
       {"EUCM", 2, extended_unified, {&C::alpha, &C::beta}},
@@ -46,16 +52,30 @@ const ColmapModel* find_colmap_model(std::string_view name) {
   return nullptr;
 }
 
+namespace {
+
+/// (x, y) / ((z + sqrt(z^2 - 4 k rho^2)) / 2): the extended unified model with alpha = 1/2, for
+/// lenses whose images shrink outwards, as wide ones do.
+void set_division(Camera& camera, double k, const std::string& name) {
+  if (k > 0) {
+    throw Error(name + ": The camera model has the division coefficient " + std::to_string(k) +
+                "; only those of wide lenses, 0 and less, are supported.");
+  }
+  camera.alpha = 0.5;
+  camera.beta = -4 * k;
+  if (k < 0) return;
+  camera.model = CameraModel::pinhole;
+  camera.alpha = Camera().alpha;
+  camera.beta = Camera().beta;
+}
+
+}  // namespace
+
 Camera camera_of(const ColmapCamera& record, const std::string& name) {
   const ColmapModel& model = *record.model;
-  const std::string remedy =
-      "; reconstruct with another one, such as OPENCV_FISHEYE (--ImageReader.camera_model).";
-  if (!model.equivalent) {
-    throw Error(name + ": The camera model " + model.name + " is not supported" + remedy);
-  }
   const double* next = record.parameters.data();
   Camera camera;
-  camera.model = *model.equivalent;
+  camera.model = model.equivalent;
   constexpr double beyond_any_image = 1e6;  // which validate() refuses
   camera.width = static_cast<int>(std::min(record.width, beyond_any_image));
   camera.height = static_cast<int>(std::min(record.height, beyond_any_image));
@@ -68,17 +88,11 @@ Camera camera_of(const ColmapCamera& record, const std::string& name) {
   // COLMAP's pixel centres lie at half pixels.
   camera.cx = *next++ - 0.5;
   camera.cy = *next++ - 0.5;
-  for (double Camera::*member : model.coefficients) {
-    const double value = *next++;
-    if (member != nullptr) {
-      camera.*member = value;
-    } else if (value != 0) {
-      throw Error(name + ": The camera model " + model.name +
-                  " is supported only without thin-prism, tangential and rational coefficients" +
-                  remedy);
-    }
+  for (double Camera::*member : model.coefficients) camera.*member = *next++;
+  if (std::string_view(model.name).ends_with("DIVISION")) {
+    set_division(camera, camera.beta, name + ": " + model.name);
   }
-  return camera;
+  return simplified(camera);
 }
 
 }  // namespace widestereo::calibration

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,8 +16,8 @@ namespace widestereo::calibration {
 struct ColmapModel {
   const char* name;
   std::size_t focal_lengths;
-  std::optional<CameraModel> equivalent;
-  /// Where each coefficient goes; null: the equivalent needs it to be 0.
+  CameraModel equivalent;
+  /// Where each coefficient goes.
   std::vector<double Camera::*> coefficients;
 
   std::size_t parameters() const { return focal_lengths + 2 + coefficients.size(); }
@@ -36,7 +35,8 @@ struct ColmapCamera {
   std::vector<double> parameters;  ///< as many as the model has
 };
 
-/// The equivalent camera. Throws Error, beginning with `name`, where there is none.
+/// The equivalent camera. Throws Error, beginning with `name`, for pincushion division models,
+/// which have none.
 Camera camera_of(const ColmapCamera& camera, const std::string& name);
 
 }  // namespace widestereo::calibration

@@ -28,6 +28,9 @@ void set_unified_from_alpha(Camera& camera, double alpha);
 /// alpha = xi / (1 + xi); the focal length of the alpha form is f_xi / (1 + xi).
 double unified_alpha(const Camera& camera);
 
+/// The same camera in the model with the fewest coefficients: without those that are 0.
+Camera simplified(Camera camera);
+
 /// The rotation nearest to a matrix (orthonormal but for rounding) and a translation as a rigid
 /// motion; fails when they are not one.
 Eigen::Isometry3d rigid(const Document& document, const std::string& what,

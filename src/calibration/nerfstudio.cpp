@@ -17,22 +17,29 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr std::pair<const char*, double Camera::*> coefficient_keys[] = {
-    {"k1", &Camera::k1},
-    {"k2", &Camera::k2},
-    {"k3", &Camera::k3},
-    {"k4", &Camera::k4},
-    {"p1", &Camera::p1},
-    {"p2", &Camera::p2},
-    // Rational and thin-prism ones, which no camera here has.
-    {"k5", nullptr},
-    {"k6", nullptr},
-    {"sx1", nullptr},
-    {"sx2", nullptr},
-    {"sy1", nullptr},
-    {"sy2", nullptr}};
+    {"k1", &Camera::k1},  {"k2", &Camera::k2},  {"k3", &Camera::k3},  {"k4", &Camera::k4},
+    {"p1", &Camera::p1},  {"p2", &Camera::p2},  {"k5", &Camera::k5},  {"k6", &Camera::k6},
+    {"sx1", &Camera::s1}, {"sx2", &Camera::s2}, {"sy1", &Camera::s3}, {"sy2", &Camera::s4}};
+/// Stands for them: the first six, or all of Project Aria's cameras in their own order.
+constexpr const char* coefficient_list = "distortion_params";
+constexpr std::size_t listed_coefficients = 6;
 constexpr const char* camera_keys[] = {
-    "camera_model",   "is_fisheye",    "w", "h", "cx", "cy", "fl_x", "fl_y",
-    "camera_angle_x", "camera_angle_y"};
+    "camera_model",   "is_fisheye",    "w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x",
+    "camera_angle_y", coefficient_list};
+constexpr const char* aria_name = "FISHEYE624";
+
+/// nerfstudio's model of this name has k3, which COLMAP's has not.
+const ColmapModel& radial_tangential() {
+  using C = Camera;
+  static const ColmapModel model = {
+      "OPENCV", 2, CameraModel::pinhole_radtan, {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3}};
+  return model;
+}
+
+const ColmapModel* find_model(const std::string& name) {
+  if (name == radial_tangential().name) return &radial_tangential();
+  return find_colmap_model(name == aria_name ? "RAD_TAN_THIN_PRISM_FISHEYE" : name);
+}
 
 Json parsed(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -109,8 +116,31 @@ class Reader {
       if (!given->is_string()) fail(i, "\"camera_model\" is no string.");
       name = given->get<std::string>();
     }
-    // nerfstudio's radial-tangential model has k3, too.
-    return name == "OPENCV" && number_or(0, frame, i, "k3") != 0 ? "FULL_OPENCV" : name;
+    return name;
+  }
+
+  /// In a camera that has nothing else; those of a list in this order.
+  Camera coefficients(const Json& frame, std::size_t i,
+                      const std::vector<double Camera::*>& listed) const {
+    Camera camera;
+    const Json* list = find(frame, coefficient_list);
+    for (const auto& [key, member] : coefficient_keys) {
+      if (list != nullptr && has(frame, key)) {
+        fail(i, std::string("It has both \"") + coefficient_list + "\" and \"" + key +
+                    "\"; remove what is not meant.");
+      }
+      camera.*member = number_or(0, frame, i, key);
+    }
+    if (list == nullptr) return camera;
+    const bool complete = list->is_array() && list->size() == listed.size() &&
+                          std::all_of(list->begin(), list->end(),
+                                      [](const Json& value) { return value.is_number(); });
+    if (!complete) {
+      fail(i, std::string("\"") + coefficient_list + "\" is no list of " +
+                  std::to_string(listed.size()) + " numbers, as its camera model has.");
+    }
+    for (std::size_t k = 0; k < listed.size(); ++k) camera.*listed[k] = (*list)[k].get<double>();
+    return camera;
   }
 
   /// Focal lengths and principal point.
@@ -130,10 +160,15 @@ class Reader {
 
   ColmapCamera camera_of(const Json& frame, std::size_t i) const {
     const std::string name = model_name(frame, i);
-    const ColmapModel* model = find_colmap_model(name);
-    if (model == nullptr || !model->equivalent) {
-      fail(i, "The camera model " + name +
-                  " is not supported; OPENCV_FISHEYE, OPENCV, PINHOLE and EQUIRECTANGULAR are.");
+    const ColmapModel* model = find_model(name);
+    const auto has_key = [](double Camera::*member) {
+      return std::any_of(std::begin(coefficient_keys), std::end(coefficient_keys),
+                         [member](const auto& key) { return key.second == member; });
+    };
+    if (model == nullptr ||
+        !std::all_of(model->coefficients.begin(), model->coefficients.end(), has_key)) {
+      fail(i, "The camera model " + name + " is not supported; OPENCV_FISHEYE, OPENCV, PINHOLE, " +
+                  aria_name + " and EQUIRECTANGULAR are.");
     }
     ColmapCamera camera;
     camera.model = model;
@@ -145,23 +180,18 @@ class Reader {
     } else {
       camera.parameters = pinhole_parameters(frame, i, *model, camera);
     }
-    std::size_t used = 0;
-    std::size_t given = 0;
-    for (const auto& [key, member] : coefficient_keys) {
-      given += number_or(0, frame, i, key) != 0 ? 1 : 0;
+    std::vector<double Camera::*> listed;
+    for (std::size_t k = 0; k < listed_coefficients; ++k) {
+      listed.push_back(coefficient_keys[k].second);
     }
+    const bool of_aria = model->equivalent == CameraModel::rad_tan_thin_prism_fisheye;
+    Camera given = coefficients(frame, i, of_aria ? model->coefficients : listed);
     for (double Camera::*member : model->coefficients) {
-      const auto key = std::find_if(std::begin(coefficient_keys), std::end(coefficient_keys),
-                                    [member](const auto& k) { return k.second == member; });
-      const double value = member == nullptr || key == std::end(coefficient_keys)
-                               ? 0
-                               : number_or(0, frame, i, key->first);
-      camera.parameters.push_back(value);
-      used += value != 0 ? 1 : 0;
+      camera.parameters.push_back(std::exchange(given.*member, 0));
     }
-    if (used != given) {
-      fail(i, "There are coefficients that the camera model " + name +
-                  " does not have; only its own of k1 to k4, p1 and p2 are supported.");
+    if (std::any_of(std::begin(coefficient_keys), std::end(coefficient_keys),
+                    [&given](const auto& key) { return given.*key.second != 0; })) {
+      fail(i, "There are coefficients that the camera model " + name + " does not have.");
     }
     return camera;
   }

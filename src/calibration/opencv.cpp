@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <iterator>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -120,28 +122,32 @@ Camera read_camera(const Storage& storage, const CameraKeys& keys, cv::Size size
   camera.fy = k.at<double>(1, 1);
   camera.cy = k.at<double>(1, 2);
   const cv::Mat_<double> c = d.reshape(1, 1);
-  camera.k1 = c(0);
-  camera.k2 = c(1);
   if (!xi.empty()) {
     require_zero(storage, keys, c.colRange(4, c.cols),
                  "cv::omnidir has four, k1 k2 p1 p2: calibrate with it.");
     camera.model = CameraModel::mei;
     camera.xi = xi.at<double>(0);
+    camera.k1 = c(0);
+    camera.k2 = c(1);
     camera.p1 = c(2);
     camera.p2 = c(3);
   } else if (c.cols == kannala_brandt_coefficients) {
     // cv::fisheye: four radial coefficients. Files of cv::stereoCalibrate have five or more.
     camera.model = CameraModel::kannala_brandt;
+    camera.k1 = c(0);
+    camera.k2 = c(1);
     camera.k3 = c(2);
     camera.k4 = c(3);
   } else {
-    require_zero(storage, keys, c.colRange(5, c.cols),
-                 "calibrate with k1 k2 p1 p2 k3 alone, without CALIB_RATIONAL_MODEL, "
-                 "CALIB_THIN_PRISM_MODEL and CALIB_TILTED_MODEL.");
-    camera.model = CameraModel::pinhole_radtan;
-    camera.p1 = c(2);
-    camera.p2 = c(3);
-    camera.k3 = c(4);
+    // In cv::stereoCalibrate()'s order; a sensor's tilt may follow.
+    using C = Camera;
+    constexpr double C::*members[] = {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, &C::k4,
+                                      &C::k5, &C::k6, &C::s1, &C::s2, &C::s3, &C::s4};
+    const int used = std::min(c.cols, static_cast<int>(std::size(members)));
+    require_zero(storage, keys, c.colRange(used, c.cols), "calibrate without CALIB_TILTED_MODEL.");
+    camera.model = CameraModel::pinhole_rational;
+    for (int i = 0; i < used; ++i) camera.*members[i] = c(i);
+    return simplified(camera);
   }
   return camera;
 }

@@ -28,6 +28,27 @@ void set_unified_from_alpha(Camera& camera, double alpha) {
 
 double unified_alpha(const Camera& camera) { return camera.xi / (1 + camera.xi); }
 
+Camera simplified(Camera camera) {
+  const auto lacks = [&camera](auto... members) { return ((camera.*members == 0) && ...); };
+  using C = Camera;
+  switch (camera.model) {
+    case CameraModel::pinhole_rational:
+      if (lacks(&C::k4, &C::k5, &C::k6, &C::s1, &C::s2, &C::s3, &C::s4)) {
+        camera.model = CameraModel::pinhole_radtan;
+      }
+      break;
+    case CameraModel::thin_prism_fisheye:
+    case CameraModel::rad_tan_thin_prism_fisheye:
+      if (lacks(&C::k5, &C::k6, &C::p1, &C::p2, &C::s1, &C::s2, &C::s3, &C::s4)) {
+        camera.model = CameraModel::kannala_brandt;
+      }
+      break;
+    default:
+      break;
+  }
+  return camera;
+}
+
 Eigen::Isometry3d rigid(const Document& document, const std::string& what,
                         const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
   if (!rotation.allFinite() || !translation.allFinite() || !is_rotation(rotation)) {

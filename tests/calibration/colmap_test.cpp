@@ -173,25 +173,59 @@ TEST_F(Colmap, ConvertsEveryModelWithAnEquivalent) {
   EXPECT_EQ(camera("RADIAL 8 8 2 4 4 0.1 0.2").k2, 0.2);
   EXPECT_EQ(camera("OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4").p2, 0.4);
   EXPECT_EQ(camera("FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0 0 0").k3, 0.5);
+  const Camera rational = camera("FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8");
+  EXPECT_EQ(rational.model, CameraModel::pinhole_rational);
+  EXPECT_EQ(rational.p1, 0.3);
+  EXPECT_EQ(rational.k3, 0.5);
+  EXPECT_EQ(rational.k6, 0.8);
   EXPECT_EQ(camera("FOV 8 8 2 3 4 4 0.9").omega, 0.9);
   EXPECT_EQ(camera("SIMPLE_RADIAL_FISHEYE 8 8 2 4 4 0.1").k1, 0.1);
   EXPECT_EQ(camera("RADIAL_FISHEYE 8 8 2 4 4 0.1 0.2").k2, 0.2);
   EXPECT_EQ(camera("THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0 0 0.3 0.4 0 0").k4, 0.4);
+  const Camera eth3d = camera("THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 .01 .02 0.3 0.4 .03 .04");
+  EXPECT_EQ(eth3d.model, CameraModel::thin_prism_fisheye);
+  EXPECT_EQ(eth3d.p2, 0.02);
+  EXPECT_EQ(eth3d.k4, 0.4);
+  EXPECT_EQ(eth3d.s1, 0.03);
+  EXPECT_EQ(eth3d.s3, 0.04);
+  const Camera aria =
+      camera("RAD_TAN_THIN_PRISM_FISHEYE 8 8 2 3 4 4 .1 .2 .3 .4 .5 .6 .01 .02 .03 .04 .05 .06");
+  EXPECT_EQ(aria.model, CameraModel::rad_tan_thin_prism_fisheye);
+  EXPECT_EQ(aria.k6, 0.6);
+  EXPECT_EQ(aria.p2, 0.01);
+  EXPECT_EQ(aria.p1, 0.02);
+  EXPECT_EQ(aria.s2, 0.04);
+  EXPECT_EQ(aria.s4, 0.06);
+  // What has no coefficients but those of a simpler model is one.
+  EXPECT_EQ(camera("FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0 0 0").model,
+            CameraModel::pinhole_radtan);
+  EXPECT_EQ(camera("THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0 0 0.3 0.4 0 0").model,
+            CameraModel::kannala_brandt);
+  EXPECT_EQ(camera("RAD_TAN_THIN_PRISM_FISHEYE 8 8 2 3 4 4 .1 .2 .3 .4 0 0 0 0 0 0 0 0").model,
+            CameraModel::kannala_brandt);
   EXPECT_EQ(camera("SIMPLE_FISHEYE 8 8 2 4 4").model, CameraModel::kannala_brandt);
   EXPECT_EQ(camera("FISHEYE 8 8 2 3 4 4").fy, 3);
   EXPECT_EQ(camera("EUCM 8 8 2 3 4 4 0.6 1.1").beta, 1.1);
   EXPECT_EQ(camera("EQUIRECTANGULAR 8 4 8 4"), whole_sphere(8, 4));
 }
 
-TEST_F(Colmap, RefusesModelsWithoutEquivalentByName) {
-  for (const char* line : {"THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0.01 0 0.3 0.4 0 0",
-                           "FULL_OPENCV 8 8 2 3 4 4 0.1 0.2 0.3 0.4 0.5 0.6 0 0",
-                           "RAD_TAN_THIN_PRISM_FISHEYE 8 8 2 3 4 4 0 0 0 0 0 0 0 0 0 0 0 0",
-                           "DIVISION 8 8 2 3 4 4 0.1"}) {
-    const std::string model(line, std::string(line).find(' '));
-    const std::string message = test::error_of([&] { camera(line); });
-    EXPECT_NE(message.find("cameras.txt: The camera model " + model), std::string::npos) << message;
+// u = 2 f x / (z + sqrt(z^2 - 4 k rho^2)) + cx, as COLMAP projects.
+TEST_F(Colmap, DivisionIsTheExtendedUnifiedModel) {
+  const Camera c = camera("DIVISION 640 480 200 201 320 240 -0.3");
+  for (const Eigen::Vector3d& point :
+       {Eigen::Vector3d(0.1, -0.2, 1), Eigen::Vector3d(2, 1, 0.5), Eigen::Vector3d(-1, 3, -0.4)}) {
+    const double denominator =
+        0.5 * (point.z() + std::sqrt(point.z() * point.z() + 1.2 * point.head<2>().squaredNorm()));
+    Eigen::Vector2d pixel;
+    ASSERT_TRUE(project(c, point, pixel));
+    EXPECT_NEAR(pixel.x(), 200 * point.x() / denominator + 319.5, 1e-9);
+    EXPECT_NEAR(pixel.y(), 201 * point.y() / denominator + 239.5, 1e-9);
   }
+  EXPECT_EQ(camera("SIMPLE_DIVISION 8 8 2 4 4 0").model, CameraModel::pinhole);
+  EXPECT_EQ(camera("SIMPLE_DIVISION 8 8 2 4 4 0").alpha, 0);
+  const std::string message = test::error_of([&] { camera("DIVISION 8 8 2 3 4 4 0.1"); });
+  EXPECT_NE(message.find("cameras.txt: DIVISION: "), std::string::npos) << message;
+  EXPECT_NE(message.find("0.1"), std::string::npos) << message;
 }
 
 TEST_F(Colmap, RangeCoversTheDistancesOfObservedPoints) {

@@ -75,6 +75,33 @@ TEST_F(Nerfstudio, InstantNgpsWordsAreKnown) {
   EXPECT_NEAR(seen.camera.fy, 50, 1e-9);
 }
 
+// As exported from Project Aria's recordings.
+TEST_F(Nerfstudio, CoefficientsMayBeListed) {
+  const std::string aria = R"("camera_model": "FISHEYE624", "w": 96, "h": 80)";
+  const std::string intrinsics = R"(, "fl_x": 30, "fl_y": 31, "cx": 48, "cy": 40.5)";
+  const Camera c =
+      view(file(aria, frame("a.png", intrinsics + R"(, "distortion_params": [0.01, 0.02, 0.03, 0.04,
+                              0.05, 0.06, 0.001, 0.002, 0.003, 0.004, 0.005, 0.006])")))
+          .camera;
+  EXPECT_EQ(c.model, CameraModel::rad_tan_thin_prism_fisheye);
+  EXPECT_EQ(c.fx, 30);
+  EXPECT_EQ(c.k6, 0.06);
+  EXPECT_EQ(c.p2, 0.001);
+  EXPECT_EQ(c.p1, 0.002);
+  EXPECT_EQ(c.s4, 0.006);
+
+  const std::string list = R"(, "distortion_params": [0.01, 0.02, 0.03, 0.04, 0, 0])";
+  const std::string plain = R"("camera_model": "OPENCV_FISHEYE", "w": 96, "h": 80)" + intrinsics;
+  const Camera listed = view(file(plain + list, frame("a.png"))).camera;
+  EXPECT_EQ(listed.model, CameraModel::kannala_brandt);
+  EXPECT_EQ(listed.k4, 0.04);
+
+  EXPECT_NE(error(file(aria + intrinsics + list, frame("a.png"))).find("12 numbers"),
+            std::string::npos);
+  EXPECT_NE(error(file(plain + list, frame("a.png", R"(, "k1": 0.1)"))).find("both"),
+            std::string::npos);
+}
+
 TEST_F(Nerfstudio, PanoramasAreWholeSpheres) {
   const char* panorama = R"("camera_model": "EQUIRECTANGULAR", "w": 96, "h": 48, "fl_x": 48,
                             "fl_y": 48, "cx": 48, "cy": 24)";
@@ -125,7 +152,11 @@ TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
          "rigid");
   expect(file(R"("w": 9, "h": 9)", frame("a.png")), "fl_x");
   expect(file(R"("fl_x": 9, "h": 9)", frame("a.png")), "\"w\"");
-  expect(file(R"("camera_model": "ORTHOPHOTO", "w": 9, "h": 9)", frame("a.png")), "ORTHOPHOTO");
+  for (const char* name : {"ORTHOPHOTO", "EUCM"}) {
+    expect(
+        file(R"("camera_model": ")" + std::string(name) + R"(", "w": 9, "h": 9)", frame("a.png")),
+        name);
+  }
   expect(file(std::string(fisheye) + R"(, "p1": 0.1)", frame("a.png")), "coefficients");
   for (const char* key : {"k4", "k5", "sx1"}) {
     expect(file(R"("w": 9, "h": 9, "fl_x": 9, ")" + std::string(key) + R"(": 0.1)", frame("a.png")),
