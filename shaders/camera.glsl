@@ -35,7 +35,7 @@ FN bool is_fisheye(int model) {
          model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE;
 }
 
-// By a rational function, or a fisheye's polynomial, with tangential terms and thin prisms.
+// Those with k1 to k6 and thin prisms.
 FN bool has_prisms(int model) {
   return model == CAMERA_PINHOLE_RATIONAL || model == CAMERA_THIN_PRISM_FISHEYE ||
          model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE;
@@ -64,7 +64,7 @@ FN real radial_distortion(CameraParameters camera, int model, real q) {
 }
 
 // Brown-Conrady distortion, with thin prisms where the model has them, of a point on the normalised plane (of a
-// fisheye: in angles).
+// fisheye: in angles; of rad_tan_thin_prism_fisheye after radial distortion).
 FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
   real radial = real(1);
   if (model != CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) radial = radial_distortion(camera, model, q);

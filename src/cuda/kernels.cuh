@@ -144,19 +144,20 @@ struct Algorithm {
   }
 };
 
-// Blocks that a multiprocessor must be able to hold: with more, or without a bound, ptxas spills
-// registers (tools/cuda_kernel_report).
+// Blocks that a multiprocessor must be able to hold: with more ptxas spills registers, without a
+// bound it does so as well or takes so many that a block fewer fits (tools/cuda_kernel_report).
 constexpr int blocks_of_presets = 5;
 constexpr int blocks_of_any = 4;
 
-#define ENTRY_POINT_OF_BLOCKS(name, view, blocks)                                                  \
-  template <class C>                                                                               \
-  __global__ void __launch_bounds__(block_width* block_height, C::window_radius >= 0 ? blocks : blocks_of_any) \
-      name(const __grid_constant__ Context context) {                                              \
-    ivec2 pixel;                                                                                   \
-    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) {                           \
-      Algorithm<C>::name##_pixel(context, pixel);                                                  \
-    }                                                                                              \
+#define ENTRY_POINT_OF_BLOCKS(name, view, blocks)                                   \
+  template <class C>                                                                \
+  __global__ void __launch_bounds__(block_width* block_height,                      \
+                                    C::window_radius >= 0 ? blocks : blocks_of_any) \
+      name(const __grid_constant__ Context context) {                               \
+    ivec2 pixel;                                                                    \
+    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) {            \
+      Algorithm<C>::name##_pixel(context, pixel);                                   \
+    }                                                                               \
   }
 #define ENTRY_POINT(name, view) ENTRY_POINT_OF_BLOCKS(name, view, blocks_of_presets)
 

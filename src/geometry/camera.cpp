@@ -58,11 +58,11 @@ double increasing_root(Function value_and_slope, double low, double high, double
   double x = std::clamp(start, low, high);
   for (int i = 0; i < 100; ++i) {
     const auto [value, slope] = value_and_slope(x);
+    const double step = value / slope;
+    if (std::abs(step) <= 4e-16 * (1 + std::abs(x))) return x;
     (value > 0 ? high : low) = x;
-    double next = x - value / slope;
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::abs(next - x) <= 1e-16 * (1 + std::abs(x))) return next;
-    x = next;
+    x -= step;
+    if (!(x > low && x < high)) x = 0.5 * (low + high);
   }
   return x;
 }
