@@ -321,6 +321,16 @@ TEST_P(EveryDevice, FindsTheDemoSceneTwiceWithTheSameBits) {
   expect_no_validation_messages(*device);
 }
 
+/// Of the pixels that both views see, before any rejection.
+std::vector<RegionScores> expect_few_bad_pixels(double most, const StereoResult& result,
+                                                const RenderedPair& pair, int view) {
+  const std::vector<RegionScores> scores =
+      evaluate(result.views[view].distance, {}, pair.views[view].truth, pair.rig.views[view],
+               pair.rig.views[1 - view]);
+  EXPECT_LT(scores[1].bad_pixels.at(1.0), most) << to_table(scores);
+  return scores;
+}
+
 TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   Rig rig = demo_rig(64);
@@ -340,12 +350,7 @@ TEST_P(EveryDevice, HandlesViewsOfDifferentModelsAndSizes) {
   options.window_radius = 3;
   options.first_iterations = 8;
   const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
-  for (int view = 0; view < 2; ++view) {
-    const std::vector<RegionScores> scores =
-        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
-                 rig.views[1 - view]);
-    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.2) << to_table(scores);
-  }
+  for (int view = 0; view < 2; ++view) expect_few_bad_pixels(0.2, result, pair, view);
   expect_no_validation_messages(*device);
 }
 
@@ -359,12 +364,7 @@ TEST_P(EveryDevice, MatchesLensesWithPrisms) {
   std::tie(options.min_distance, options.max_distance) = demo_distance_range();
   options.regression_radius = 12;
   const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
-  for (int view = 0; view < 2; ++view) {
-    const std::vector<RegionScores> scores =
-        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
-                 rig.views[1 - view]);
-    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.05) << to_table(scores);
-  }
+  for (int view = 0; view < 2; ++view) expect_few_bad_pixels(0.05, result, pair, view);
   expect_no_validation_messages(*device);
 }
 
@@ -379,10 +379,7 @@ TEST_P(EveryDevice, MatchesPanoramas) {
   std::tie(options.min_distance, options.max_distance) = demo_distance_range();
   const StereoResult result = Matcher(*device, rig, options).match(images_of(pair));
   for (int view = 0; view < 2; ++view) {
-    const std::vector<RegionScores> scores =
-        evaluate(result.views[view].distance, {}, pair.views[view].truth, rig.views[view],
-                 rig.views[1 - view]);
-    EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.05) << to_table(scores);
+    const std::vector<RegionScores> scores = expect_few_bad_pixels(0.05, result, pair, view);
     EXPECT_LT(scores.back().bad_pixels.at(1.0), 0.05) << "behind: " << to_table(scores);
   }
   expect_no_validation_messages(*device);
