@@ -199,21 +199,6 @@ bool direction_of(const Camera& c, const kernel::dual::CameraParameters& p, Vect
   return false;
 }
 
-bool unproject_with(const Camera& c, const kernel::precise::CameraParameters& p,
-                    const kernel::dual::CameraParameters& dual, const Vector2d& pixel,
-                    Vector3d& ray) {
-  Vector2d m;
-  m.y() = (pixel.y() - c.cy) / c.fy;
-  m.x() = (pixel.x() - c.cx - c.skew * m.y()) / c.fx;
-  if (!direction_of(c, dual, m, ray)) return false;
-  ray.normalize();
-  // Projecting back checks the domain and the field of view and catches every way of not
-  // converging.
-  Vector2d again;
-  return ray.allFinite() && project_with(p, ray, again) &&
-         (again - pixel).norm() <= unprojection_tolerance * (1 + pixel.norm() / 1000);
-}
-
 std::string size_text(int width, int height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
@@ -288,8 +273,17 @@ bool PreparedCamera::project(const Vector3d& point, Vector2d& pixel,
 }
 
 bool PreparedCamera::unproject(const Vector2d& pixel, Vector3d& ray) const {
-  return unproject_with(implementation_->camera, implementation_->parameters, implementation_->dual,
-                        pixel, ray);
+  const Camera& c = implementation_->camera;
+  Vector2d m;
+  m.y() = (pixel.y() - c.cy) / c.fy;
+  m.x() = (pixel.x() - c.cx - c.skew * m.y()) / c.fx;
+  if (!direction_of(c, implementation_->dual, m, ray)) return false;
+  ray.normalize();
+  // Projecting back checks the domain and the field of view and catches every way of not
+  // converging.
+  Vector2d again;
+  return ray.allFinite() && project(ray, again) &&
+         (again - pixel).norm() <= unprojection_tolerance * (1 + pixel.norm() / 1000);
 }
 
 bool PreparedCamera::project_into_image(const Vector3d& point, Vector2d& pixel) const {
@@ -349,15 +343,14 @@ cv::Mat ray_image(const Camera& camera, const cv::Mat& mask) {
   require_fitting_mask(mask, camera, "The ray image");
   Camera whole = camera;
   whole.max_theta = std::numbers::pi;
-  const kernel::precise::CameraParameters model = camera_parameters(whole);
-  const kernel::dual::CameraParameters dual = constant(model);
+  const PreparedCamera prepared(whole);
   const double cosine = camera_parameters(camera).domain.x;
   cv::Mat rays = cv::Mat::zeros(camera.height, camera.width, CV_32FC4);
   cv::parallel_for_(cv::Range(0, camera.height), [&](const cv::Range& rows) {
     for (int y = rows.start; y < rows.end; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         Vector3d ray;
-        if (!unproject_with(whole, model, dual, {x, y}, ray)) continue;
+        if (!prepared.unproject({x, y}, ray)) continue;
         const bool usable = ray.z() >= cosine && (mask.empty() || mask.at<uchar>(y, x) != 0);
         const Eigen::Vector3f single = ray.cast<float>();
         rays.at<cv::Vec4f>(y, x) = {single.x(), single.y(), single.z(), usable ? 1.0f : 0.0f};

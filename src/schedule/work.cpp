@@ -38,6 +38,8 @@ int projection(int model) {
   constexpr int prisms = 8;
   constexpr int fisheye = 5;
   constexpr int radial_of_fisheye = 8;
+  constexpr int of_angle = 2;  // its square, and the product with it
+  constexpr int two_more_coefficients = 4;
   constexpr int to_pixels = 6;
   switch (static_cast<CameraModel>(model)) {
     case CameraModel::pinhole_radtan:
@@ -45,11 +47,12 @@ int projection(int model) {
     case CameraModel::pinhole_rational:
       return common + perspective + rational + decentring + prisms + to_pixels;
     case CameraModel::kannala_brandt:
-      return common + fisheye + radial_of_fisheye + 2 + to_pixels;
+      return common + fisheye + radial_of_fisheye + of_angle + to_pixels;
     case CameraModel::thin_prism_fisheye:
       return common + fisheye + radial_of_fisheye + decentring + prisms + to_pixels;
     case CameraModel::rad_tan_thin_prism_fisheye:
-      return common + fisheye + radial_of_fisheye + 6 + decentring + prisms + to_pixels;
+      return common + fisheye + radial_of_fisheye + two_more_coefficients + of_angle + decentring +
+             prisms + to_pixels;
     case CameraModel::double_sphere:
       return common + 10 + perspective + to_pixels;
     case CameraModel::unified:
