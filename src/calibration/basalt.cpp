@@ -150,7 +150,8 @@ Json basalt_form(const View& view, const std::filesystem::path& path) {
     default:
       throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
                   (c.skew != 0 ? " with skew" : "") +
-                  ") has no form in Basalt's format; write Kalibr instead.");
+                  ") has no form in Basalt's format; Kalibr's holds mei and equirectangular "
+                  "cameras without skew.");
   }
   return {{"camera_type", type}, {"intrinsics", values}};
 }

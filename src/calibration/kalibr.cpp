@@ -120,7 +120,8 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
       break;
   }
   throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
-              ") has no form in Kalibr's format.");
+              ") has no form in Kalibr's format; Basalt's holds pinhole_rational cameras without "
+              "prisms.");
 }
 
 }  // namespace
