@@ -22,21 +22,29 @@ file(MAKE_DIRECTORY ${spirv_folder})
 set(spirv_modules)
 file(GLOB shader_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/*.comp)
 foreach(source IN LISTS shader_sources)
-  get_filename_component(name ${source} NAME_WE)
-  set(module ${spirv_folder}/${name}.spv)
-  set(steps COMMAND ${WIDESTEREO_GLSLANG} --quiet -V --target-env ${WIDESTEREO_SPIRV_TARGET}
-                    -I${PROJECT_SOURCE_DIR}/shaders --depfile ${module}.d -o ${module} ${source})
-  if(WIDESTEREO_SPIRV_OPT)
-    list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_OPT} --target-env=${WIDESTEREO_SPIRV_TARGET} -O
-                              ${module} -o ${module})
-  endif()
-  if(WIDESTEREO_SPIRV_VAL)
-    list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_VAL} --target-env ${WIDESTEREO_SPIRV_TARGET}
-                              ${module})
-  endif()
-  add_custom_command(OUTPUT ${module} ${steps} MAIN_DEPENDENCY ${source} DEPFILE ${module}.d
-                     COMMENT "Compiling shaders/${name}.comp" VERBATIM)
-  list(APPEND spirv_modules ${module})
+  # With texture units, and as NAME_loads without (shaders/bindings.glsl).
+  foreach(suffix IN ITEMS "" _loads)
+    get_filename_component(name ${source} NAME_WE)
+    set(module ${spirv_folder}/${name}${suffix}.spv)
+    set(definitions)
+    if(suffix)
+      set(definitions -DTEXEL_LOADS)
+    endif()
+    set(steps COMMAND ${WIDESTEREO_GLSLANG} --quiet -V --target-env ${WIDESTEREO_SPIRV_TARGET}
+                      ${definitions} -I${PROJECT_SOURCE_DIR}/shaders --depfile ${module}.d
+                      -o ${module} ${source})
+    if(WIDESTEREO_SPIRV_OPT)
+      list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_OPT} --target-env=${WIDESTEREO_SPIRV_TARGET} -O
+                                ${module} -o ${module})
+    endif()
+    if(WIDESTEREO_SPIRV_VAL)
+      list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_VAL} --target-env ${WIDESTEREO_SPIRV_TARGET}
+                                ${module})
+    endif()
+    add_custom_command(OUTPUT ${module} ${steps} DEPENDS ${source} DEPFILE ${module}.d
+                       COMMENT "Compiling shaders/${name}.comp" VERBATIM)
+    list(APPEND spirv_modules ${module})
+  endforeach()
 endforeach()
 
 add_custom_command(

@@ -2,6 +2,10 @@
 // Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Images are 2D arrays: of half pixels one
 // for each level, with a layer for each of its views, as texture units must clamp to them; of all else one for all
 // levels, in which coarse views share layers (src/vulkan/atlas.h).
+//
+// Every kernel is compiled twice, for images that are read with the same bits. GPUs gather or filter four texels in one
+// instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe);
+// what they load of half pixels are four in one texel, in a third of the time of four texels.
 
 // Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -10,13 +14,14 @@ layout(constant_id = 0) const int WINDOW_RADIUS = 5;
 layout(constant_id = 1) const int WARP = 0;
 layout(constant_id = 2) const int CAMERA_MODEL = -1;
 layout(constant_id = 3) const int SOURCE_COUNT = 1;
-// How intensities are read, with the same bits either way: GPUs gather four texels in one instruction,
-// software devices load texels without their texture machinery (a quarter faster on lavapipe).
-layout(constant_id = 4) const bool SAMPLED = true;
-layout(constant_id = 5) const int PATTERN = 0;
-layout(constant_id = 6) const int WEIGHTED = 0;
-layout(constant_id = 7) const int FILTER = 0;
+layout(constant_id = 4) const int PATTERN = 0;
+layout(constant_id = 5) const int WEIGHTED = 0;
+#ifdef TEXEL_LOADS
+#define FILTER FILTER_EXACT
+#else
+layout(constant_id = 6) const int FILTER = 0;
 #define HAS_DEVICE_FILTER
+#endif
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
 layout(set = 0, binding = 1) uniform sampler2DArray intensity_texture;
@@ -26,7 +31,11 @@ layout(set = 0, binding = 4, rgba32f) uniform image2DArray hypotheses;  // and, 
 layout(set = 0, binding = 5) uniform sampler2DArray half_pixel_texture;
 layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
+#ifdef TEXEL_LOADS
+layout(set = 0, binding = 8, rgba32f) uniform image2DArray half_pixels;  // with the right, lower and lower right one
+#else
 layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
+#endif
 layout(set = 0, binding = 9, std140) uniform PlaceBlock {
   ivec4 map_places[MAX_VIEWS];        // x, y and layer of a view's pixel (0, 0); layers of one kind of map
   ivec4 intensity_places[MAX_VIEWS];  // likewise
@@ -38,22 +47,39 @@ layout(push_constant) uniform PassBlock {
 #endif
 };
 
-ivec3 in_maps(int view, ivec2 p) { return map_places[view].xyz + ivec3(p, 0); }
+// Of the view whose pixels are updated, read once: lavapipe reads blocks lane by lane, in loops each time anew.
+ivec4 map_place_of_reference = map_places[pass.reference];
+ivec4 intensity_place_of_reference = intensity_places[pass.reference];
 
-ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_places[view].w); }
+ivec4 map_place(int view) { return view == pass.reference ? map_place_of_reference : map_places[view]; }
 
-ivec3 in_intensities(int view, ivec2 p) { return intensity_places[view].xyz + ivec3(p, 0); }
+ivec3 in_maps(int view, ivec2 p) { return map_place(view).xyz + ivec3(p, 0); }
+
+ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_place(view).w); }
+
+ivec3 in_intensities(int view, ivec2 p) {
+  ivec4 place = view == pass.reference ? intensity_place_of_reference : intensity_places[view];
+  return place.xyz + ivec3(p, 0);
+}
 
 // Views of a level follow each other, and sources are of the reference's level.
 int layer_of_half_pixels(int view) { return view - pass.first_view; }
 
+ivec3 in_half_pixels(int view, ivec2 p) { return ivec3(p + HALF_PIXEL_APRON, layer_of_half_pixels(view)); }
+
 vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, in_maps(view, p)); }
 
-float intensity_at(int view, ivec2 p) {
-  ivec3 texel = in_intensities(view, p);
-  if (SAMPLED) return texelFetch(intensity_texture, texel, 0).x;
-  return imageLoad(intensities, texel).x;
-}
+#ifdef TEXEL_LOADS
+
+float intensity_at(int view, ivec2 p) { return imageLoad(intensities, in_intensities(view, p)).x; }
+
+vec4 half_pixel_taps(int view, ivec2 p) { return imageLoad(half_pixels, in_half_pixels(view, p)); }
+
+float half_pixel_at(int view, ivec2 p) { return half_pixel_taps(view, p).x; }
+
+#else
+
+float intensity_at(int view, ivec2 p) { return texelFetch(intensity_texture, in_intensities(view, p), 0).x; }
 
 // Texture coordinates of a position in texels of the memory.
 vec3 half_pixel_position(int view, vec2 texel) {
@@ -61,29 +87,22 @@ vec3 half_pixel_position(int view, vec2 texel) {
   return vec3(texel * texel_size, float(layer_of_half_pixels(view)));
 }
 
-float half_pixel_at(int view, ivec2 p) {
-  ivec3 texel = ivec3(p + HALF_PIXEL_APRON, layer_of_half_pixels(view));
-  if (SAMPLED) return texelFetch(half_pixel_texture, texel, 0).x;
-  return imageLoad(half_pixels, texel).x;
-}
+float half_pixel_at(int view, ivec2 p) { return texelFetch(half_pixel_texture, in_half_pixels(view, p), 0).x; }
 
 vec4 half_pixel_taps(int view, ivec2 p) {
-  if (SAMPLED) {
-    // The corner that the four texels share lies half a texel from any rounding trouble.
-    vec4 taps = textureGather(half_pixel_texture, half_pixel_position(view, vec2(p + HALF_PIXEL_APRON + 1)));
-    return vec4(taps.w, taps.z, taps.x, taps.y);
-  }
-  return vec4(half_pixel_at(view, p), half_pixel_at(view, p + ivec2(1, 0)),
-              half_pixel_at(view, p + ivec2(0, 1)), half_pixel_at(view, p + ivec2(1, 1)));
+  // The corner that the four texels share lies half a texel from any rounding trouble.
+  vec4 taps = textureGather(half_pixel_texture, half_pixel_position(view, vec2(p + HALF_PIXEL_APRON + 1)));
+  return vec4(taps.w, taps.z, taps.x, taps.y);
 }
 
 float filtered_half_pixel(int view, vec2 texel) {
   return textureLod(half_pixel_texture, half_pixel_position(view, texel), 0.0f).x;
 }
 
-void store_half_pixel(int view, ivec2 p, float intensity) {
-  imageStore(half_pixels, ivec3(p + HALF_PIXEL_APRON, layer_of_half_pixels(view)), vec4(intensity, 0.0f, 0.0f, 0.0f));
-}
+#endif
+
+// Images of one number a texel take the first.
+void store_half_pixel(int view, ivec2 p, vec4 taps) { imageStore(half_pixels, in_half_pixels(view, p), taps); }
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(view, p)); }
 

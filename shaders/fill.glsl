@@ -13,6 +13,8 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   float intensity = intensity_at(CONTEXT PASS.reference, pixel);
+  float inverse_scale = PARAMETERS.support.y;
+  ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   vec3 planes[8];
   float weights[8];
   int count = 0;
@@ -26,12 +28,12 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int reach = dx == 0 || dy == 0 ? PASS.radius : PASS.radius * 7 / 10;
     for (int k = 1; k <= reach; ++k) {
       ivec2 q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
-      if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) break;
+      if (!in_image(size, q)) break;
       if (check_at(CONTEXT PASS.reference, q).w != 0.0f) continue;
       vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
       vec3 m = vec3(held.x, held.y, held.z);
       if (!admissible(CONTEXT ray, m)) break;
-      float weight = 1.0f / unlikeness(CONTEXT intensity_at(CONTEXT PASS.reference, q), intensity);
+      float weight = 1.0f / unlikeness(intensity_at(CONTEXT PASS.reference, q), intensity, inverse_scale);
       int place = count;
       while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
         planes[place] = planes[place - 1];

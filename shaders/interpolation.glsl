@@ -21,20 +21,25 @@ FN float intensity_right_of(CONTEXT_ARGUMENT ivec2 pixel) {
                            intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + 2, pixel.y)));
 }
 
-// A pixel's own half pixel and those to the right, below and between.
+// A pixel's own half pixel and those to the right, below and between, each with its neighbours that a sample reads.
 FN void interpolate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  float own[4];
-  float right[4];
-  for (int i = 0; i < 4; ++i) {
-    ivec2 q = ivec2(pixel.x, pixel.y + i - 1);
-    own[i] = intensity_at(CONTEXT PASS.reference, q);
-    right[i] = intensity_right_of(CONTEXT q);
+  // Rows and columns of three: the pixel, the half pixel after it and the next pixel.
+  float texels[9];
+  UNROLL for (int column = 0; column < 3; ++column) {
+    float down[4];
+    UNROLL for (int i = 0; i < 4; ++i) {
+      ivec2 q = ivec2(pixel.x + column / 2, pixel.y + i - 1);
+      down[i] = column == 1 ? intensity_right_of(CONTEXT q) : intensity_at(CONTEXT PASS.reference, q);
+    }
+    texels[column] = down[1];
+    texels[3 + column] = intensity_between(CONTEXT down[0], down[1], down[2], down[3]);
+    texels[6 + column] = down[2];
   }
-  ivec2 texel = ivec2(2 * pixel.x, 2 * pixel.y);
-  store_half_pixel(CONTEXT PASS.reference, texel, own[1]);
-  store_half_pixel(CONTEXT PASS.reference, ivec2(texel.x + 1, texel.y), right[1]);
-  store_half_pixel(CONTEXT PASS.reference, ivec2(texel.x, texel.y + 1),
-                   intensity_between(CONTEXT own[0], own[1], own[2], own[3]));
-  store_half_pixel(CONTEXT PASS.reference, ivec2(texel.x + 1, texel.y + 1),
-                   intensity_between(CONTEXT right[0], right[1], right[2], right[3]));
+  UNROLL for (int row = 0; row < 2; ++row) {
+    UNROLL for (int column = 0; column < 2; ++column) {
+      int first = 3 * row + column;
+      store_half_pixel(CONTEXT PASS.reference, ivec2(2 * pixel.x + column, 2 * pixel.y + row),
+                       vec4(texels[first], texels[first + 1], texels[first + 3], texels[first + 4]));
+    }
+  }
 }

@@ -225,8 +225,9 @@ FN float growth(float a) {
   return t * t;
 }
 
-// From 1 on, how unlike two intensities of the reference are: pixels of one surface mostly are alike.
-FN float unlikeness(CONTEXT_ARGUMENT float a, float b) { return growth(abs(a - b) * PARAMETERS.support.y); }
+// From 1 on, how unlike two intensities of the reference are: pixels of one surface mostly are alike. `inverse_scale`:
+// PARAMETERS.support.y, which loops read once.
+FN float unlikeness(float a, float b, float inverse_scale) { return growth(abs(a - b) * inverse_scale); }
 
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
 // which loops read once. Zero for masked samples; others differ by 1 at most.

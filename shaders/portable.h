@@ -11,7 +11,7 @@
 //   vec4  half_pixel_taps(view, texel)      there and at its right, lower and lower right neighbour
 //   float filtered_half_pixel(view, texel)  bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
 //                                           its centre at HALF_PIXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
-//   void  store_half_pixel(view, texel, intensity)
+//   void  store_half_pixel(view, texel, vec4)   as half_pixel_taps() reads them, of which memories may keep the first
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
 //   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl.
 #ifndef WIDESTEREO_PORTABLE_H

@@ -69,6 +69,7 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
   int model = model_of(CONTEXT camera);
   PatchStart start;
   if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, start)) return 0.0f;
+  float inverse_scale = PARAMETERS.support.x;
   float n = 0.0f;
   float sum_a = 0.0f;
   float sum_b = 0.0f;
@@ -89,7 +90,7 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
       if (!slope_at(CONTEXT q, direction, slope) || min(a, b) < 0.0f) continue;
       a -= start.centre_a;
       b -= start.centre_b;
-      float weight = sample_weight(CONTEXT a, PARAMETERS.support.x);
+      float weight = sample_weight(CONTEXT a, inverse_scale);
       n += weight;
       sum_a += weight * a;
       sum_b += weight * b;
@@ -138,6 +139,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     speed = length(velocity);
     vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
     vec2 direction = reference_direction(CONTEXT source, pixel, m, along);
+    float inverse_scale = PARAMETERS.support.x;
     float information = 0.0f;
     float n = 0.0f;
     float sum = 0.0f;
@@ -149,7 +151,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         float slope;
         if (!slope_at(CONTEXT q, direction, slope) || a < 0.0f) continue;
         a -= centre;
-        float weight = sample_weight(CONTEXT a, PARAMETERS.support.x);
+        float weight = sample_weight(CONTEXT a, inverse_scale);
         information += weight * slope * slope;
         n += weight;
         sum += weight * a;
@@ -198,6 +200,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float fall_off = 2.0f / float(radius * radius);
+  float inverse_scale = PARAMETERS.support.y;
   int step = max(radius / PASS.steps, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
@@ -231,7 +234,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float doubt = 1.0f + residual * residual / scale2;
       float weight = measure.y * measure.y /
                      (measure.x * doubt * doubt * growth(float(dx * dx + dy * dy) * fall_off) *
-                      unlikeness(CONTEXT measure.w, own.w));
+                      unlikeness(measure.w, own.w, inverse_scale));
       s += weight;
       sx += weight * x;
       sy += weight * y;

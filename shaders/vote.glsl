@@ -91,6 +91,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     float intensity = intensity_at(CONTEXT PASS.reference, pixel);
     float fall_off = 1.0f / float(PASS.radius * PASS.radius);
+    float inverse_scale = PARAMETERS.support.y;
     float most = 0.0f;
     // Every pixel asks others, so that neighbours do not all make the same mistake.
     vec4 u = draw4(CONTEXT pixel, VOTE_SLOT);
@@ -104,7 +105,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         if (plane.w >= INVALID_COST) continue;
         float w = inverse_distance_of(plane, ray);
         float weight = 1.0f / (growth(float(dx * dx + dy * dy) * fall_off) *
-                               unlikeness(CONTEXT intensity_at(CONTEXT PASS.reference, q), intensity));
+                               unlikeness(intensity_at(CONTEXT PASS.reference, q), intensity, inverse_scale));
         most += weight * support_between(w, own, scale);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
           support[i] += weight * support_between(w, candidates[i], scale);

@@ -65,8 +65,8 @@ inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   const float* bottom = half_pixel_address(CONTEXT view, ivec2(p.x, p.y + 1));
   return {top[0], top[1], bottom[0], bottom[1]};
 }
-inline void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
-  *half_pixel_address(CONTEXT view, p) = intensity;
+inline void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
+  *half_pixel_address(CONTEXT view, p) = taps.x;
 }
 inline void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
   context.views[view].intensities(p.y + APRON, p.x + APRON) = intensity;

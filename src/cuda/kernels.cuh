@@ -76,8 +76,8 @@ struct Algorithm {
   FN float filtered_half_pixel(CONTEXT_ARGUMENT int view, vec2 texel) {
     return tex2D<float>(context.views[view].texture, texel.x, texel.y);
   }
-  FN void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
-    *half_pixel_address(CONTEXT view, p) = intensity;
+  FN void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
+    *half_pixel_address(CONTEXT view, p) = taps.x;
   }
   FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
     *intensity_address(CONTEXT view, p) = intensity;

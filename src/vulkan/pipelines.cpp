@@ -84,7 +84,7 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
                      VkPipelineCache cache)
-    : specialisation_{constants, sampled ? VK_TRUE : VK_FALSE} {
+    : constants_(constants), sampled_(sampled) {
   make_layouts(context);
   for (int i = 0; i < kernel_count; ++i) {
     const Kernel kernel = static_cast<Kernel>(i);
@@ -116,20 +116,18 @@ void Pipelines::make_layouts(const VulkanContext& context) {
 
 Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::string& name,
                                    VkPipelineLayout layout, VkPipelineCache cache) const {
-  static constexpr std::array<VkSpecializationMapEntry, 8> entries = {{
-      {0, offsetof(Specialisation, constants.window_radius), sizeof(int)},
-      {1, offsetof(Specialisation, constants.warp), sizeof(int)},
-      {2, offsetof(Specialisation, constants.camera_model), sizeof(int)},
-      {3, offsetof(Specialisation, constants.source_count), sizeof(int)},
-      {4, offsetof(Specialisation, sampled), sizeof(VkBool32)},
-      {5, offsetof(Specialisation, constants.pattern), sizeof(int)},
-      {6, offsetof(Specialisation, constants.weighted), sizeof(int)},
-      {7, offsetof(Specialisation, constants.filter), sizeof(int)},
+  static constexpr std::array<VkSpecializationMapEntry, 7> entries = {{
+      {0, offsetof(KernelConstants, window_radius), sizeof(int)},
+      {1, offsetof(KernelConstants, warp), sizeof(int)},
+      {2, offsetof(KernelConstants, camera_model), sizeof(int)},
+      {3, offsetof(KernelConstants, source_count), sizeof(int)},
+      {4, offsetof(KernelConstants, pattern), sizeof(int)},
+      {5, offsetof(KernelConstants, weighted), sizeof(int)},
+      {6, offsetof(KernelConstants, filter), sizeof(int)},
   }};
-  const Handle<VkShaderModule> module = make_module(context, name);
+  const Handle<VkShaderModule> module = make_module(context, sampled_ ? name : name + "_loads");
   const VkSpecializationInfo specialisation = {static_cast<std::uint32_t>(entries.size()),
-                                               entries.data(), sizeof specialisation_,
-                                               &specialisation_};
+                                               entries.data(), sizeof constants_, &constants_};
   VkComputePipelineCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO;
   info.stage.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;

@@ -43,7 +43,8 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 /// specialised for constants; all share one descriptor set layout.
 class Pipelines {
  public:
-  /// `sampled`: intensities are read through the texture units instead of as storage images.
+  /// `sampled`: intensities are read through the texture units instead of as storage images, which
+  /// hold half pixels in another format (shaders/bindings.glsl).
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);
 
@@ -56,14 +57,10 @@ class Pipelines {
                           VkPipelineLayout layout, VkPipelineCache cache) const;
 
  private:
-  struct Specialisation {
-    KernelConstants constants;
-    VkBool32 sampled = VK_TRUE;
-  };
-
   void make_layouts(const VulkanContext& context);
 
-  Specialisation specialisation_;
+  KernelConstants constants_;
+  bool sampled_;
   Handle<VkDescriptorSetLayout> set_layout_;
   Handle<VkPipelineLayout> layout_;
   std::array<Handle<VkPipeline>, kernel_count> pipelines_;

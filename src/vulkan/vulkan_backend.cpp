@@ -12,6 +12,8 @@ namespace {
 
 constexpr VkFormat map_format = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
+/// Without texture units: each with the neighbours that a bilinear sample reads.
+constexpr VkFormat format_of_loaded_half_pixels = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr std::size_t max_bands_per_submission = 256;
 constexpr VkPipelineStageFlags compute_and_transfer =
     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
@@ -117,8 +119,8 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
-      pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
-                                cache.get())),
+      sampled_(tuning.sampled.value_or(!runs_on_cpu(context))),
+      pipelines_(make_pipelines(context, constants, sampled_, cache.get())),
       map_atlas_(pack_views(sizes, 0)),
       intensity_atlas_(pack_views(sizes, APRON)),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
@@ -143,18 +145,21 @@ void VulkanBackend::make_images(const VulkanContext& context) {
                           VK_IMAGE_USAGE_TRANSFER_DST_BIT,
                       purpose);
   };
-  const auto make_intensities = [&](cv::Size with_rim, int layers, const char* purpose) {
+  const auto make_intensities = [&](VkFormat format, cv::Size with_rim, int layers,
+                                    const char* purpose) {
     return make_image(
-        context, intensity_format, with_rim, layers,
+        context, format, with_rim, layers,
         VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
         purpose);
   };
-  intensities_ = make_intensities(intensity_atlas_.size, intensity_atlas_.layers, "the images");
+  intensities_ = make_intensities(intensity_format, intensity_atlas_.size, intensity_atlas_.layers,
+                                  "the images");
   const std::span<const cv::Size> sizes = sizes_;
   const auto views = static_cast<std::size_t>(views_of_level());
   for (std::size_t first = 0; first < sizes.size(); first += views) {
     half_pixels_.push_back(
-        make_intensities(size_of_half_pixels(largest(sizes.subspan(first, views))),
+        make_intensities(sampled_ ? intensity_format : format_of_loaded_half_pixels,
+                         size_of_half_pixels(largest(sizes.subspan(first, views))),
                          views_of_level(), "the images at half pixels"));
   }
   rays_ = make_map(1, "the viewing rays");
@@ -246,7 +251,7 @@ void VulkanBackend::start_memory() {
     transition(commands, image, all, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
   };
   VkClearColorValue masked{};
-  masked.float32[0] = MASKED_INTENSITY;
+  std::fill_n(masked.float32, 4, MASKED_INTENSITY);
   clear(intensities_, masked);
   for (const LayeredImage& half_pixels : half_pixels_) clear(half_pixels, masked);
   clear(rays_, {});

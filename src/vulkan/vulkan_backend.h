@@ -22,7 +22,7 @@ struct VulkanTuning {
   /// Longest dispatch and submission in patch samples, 0 = by device type.
   long long max_samples = 0;
   /// Reads intensities through the texture units; unset: everywhere but on CPUs. Without, filtering
-  /// is exact.
+  /// is exact, and half pixels take four times the memory.
   std::optional<bool> sampled = std::nullopt;
 };
 
@@ -84,6 +84,7 @@ class VulkanBackend final : public Backend {
   std::vector<cv::Size> sizes_;
   KernelConstants constants_;
   long long max_samples_;
+  bool sampled_;  // through texture units: VulkanTuning
   Pipelines pipelines_;
   Atlas map_atlas_;
   Atlas intensity_atlas_;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double bytes_of_pixel = 16 + 16 + 16 + 16;  // ray, plane, checks, prior
 constexpr double bytes_of_intensity = 4;              // of the image and 16 pixels around it,
-                                                      // and of its half pixels and 32 around them
+                                                      // or a half pixel and 32 around them
 constexpr double bytes_of_transfer = 4 + 4;
 constexpr double side = 128;
 
@@ -39,13 +39,17 @@ TEST_P(Memory, IsWhatIsDocumented) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   const double line = device->info().kind == DeviceKind::cuda ? 128 / bytes_of_intensity : 1;
   const bool levels_share_layers = device->info().kind == DeviceKind::vulkan;
+  // Software Vulkan keeps each half pixel with its right, lower and lower right neighbour.
+  const bool loads = levels_share_layers && device->info().type == "cpu";
+  const double bytes_of_half_pixel = (loads ? 4 : 1) * bytes_of_intensity;
   for (const auto& [preset, levels] : {std::pair("paper", 1), std::pair("fast", 3)}) {
     // Vulkan stages transfers of one map in a buffer.
     double expected = side * side * (bytes_of_transfer + (levels_share_layers ? 16 : 0));
     for (int level = 0; level < levels; ++level) {
       const double own = side / (1 << level);
       const double intensities = levels_share_layers ? 0 : texels_of(own + 2 * 16, line);
-      expected += 2 * (intensities + texels_of(2 * own + 2 * 32, line)) * bytes_of_intensity;
+      expected += 2 * intensities * bytes_of_intensity;
+      expected += 2 * texels_of(2 * own + 2 * 32, line) * bytes_of_half_pixel;
       if (!levels_share_layers) expected += 2 * own * own * bytes_of_pixel;
     }
     if (levels_share_layers) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -261,29 +262,55 @@ TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   EXPECT_THAT(error_of([&] { backend->run(raster, {}); }), HasSubstr("sequential"));
 }
 
-TEST(VulkanMatch, FiltersExactlyWhereTheDeviceCannotAndSaysSo) {
-  REQUIRE_VULKAN_OR_SKIP();
-  const RenderedPair pair = render_demo(32);
+constexpr int demo_size = 32;
+
+/// The demo scene by the preset `fast` on the first device, which states `faults`.
+StereoResult match_demo_with(const Faults& faults, Filter filter) {
+  const RenderedPair pair = render_demo(demo_size);
   Options options = Options::preset_named("fast");
   std::tie(options.min_distance, options.max_distance) = demo_distance_range();
   options.sweep_steps = 4;
+  options.filter = filter;
   const FaultyLoader::Scope scope;
-  const auto match = [&](const Faults& faults) {
-    FaultyLoader::faults() = faults;
-    Device device(open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr()));
-    const StereoResult result =
-        Matcher(device, pair.rig, options).match(pair.views[0].image, pair.views[1].image);
-    EXPECT_THAT(device.validation_messages(), IsEmpty());
-    return result;
-  };
+  FaultyLoader::faults() = faults;
+  Device device(open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr()));
+  const StereoResult result =
+      Matcher(device, pair.rig, options).match(pair.views[0].image, pair.views[1].image);
+  EXPECT_THAT(device.validation_messages(), IsEmpty());
+  return result;
+}
+
+TEST(VulkanMatch, SoftwareLoadsTheBitsThatGpusGather) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const StereoResult gpu = match_demo_with({.is_gpu = true}, Filter::exact);
+  const StereoResult software = match_demo_with({}, Filter::exact);
+  ASSERT_EQ(gpu.views.size(), software.views.size());
+  for (std::size_t view = 0; view < gpu.views.size(); ++view) {
+    SCOPED_TRACE(view);
+    EXPECT_TRUE(same_bits(gpu.views[view].distance, software.views[view].distance));
+    EXPECT_TRUE(same_bits(gpu.views[view].normals, software.views[view].normals));
+    EXPECT_TRUE(same_bits(gpu.views[view].cost, software.views[view].cost));
+    EXPECT_TRUE(same_bits(gpu.views[view].confidence, software.views[view].confidence));
+  }
+  // Three neighbours more of each half pixel, of two views at three levels.
+  double bytes = 0;
+  for (const int size : {demo_size, demo_size / 2, demo_size / 4}) {
+    bytes += 2 * 12 * std::pow(2 * (size + 2 * APRON), 2);
+  }
+  EXPECT_NEAR(static_cast<double>(software.device_bytes - gpu.device_bytes), bytes, 0.01 * bytes);
+}
+
+TEST(VulkanMatch, FiltersExactlyWhereTheDeviceCannotAndSaysSo) {
+  REQUIRE_VULKAN_OR_SKIP();
   // What texture units do is not counted.
   const auto operations = [](const StereoResult& result) {
     double sum = 0;
     for (const KernelTime& time : result.times) sum += time.work.operations;
     return sum;
   };
-  const StereoResult by_device = match({.is_gpu = true});
-  const StereoResult without = match({.no_filtering = true, .is_gpu = true});
+  const StereoResult by_device = match_demo_with({.is_gpu = true}, Filter::device);
+  const StereoResult without =
+      match_demo_with({.no_filtering = true, .is_gpu = true}, Filter::device);
   EXPECT_EQ(by_device.filter, Filter::device);
   EXPECT_EQ(without.filter, Filter::exact);
   EXPECT_GT(operations(without), operations(by_device));
