@@ -2,7 +2,9 @@
 #include "input_record.h"
 
 #include <chrono>
+#include <functional>
 #include <opencv2/core.hpp>
+#include <string_view>
 #include <system_error>
 
 namespace ws = widestereo;
@@ -25,6 +27,18 @@ Json intrinsics_of(const ws::Camera& camera) {
   return record;
 }
 
+namespace {
+
+/// Tells masks with as many pixels apart; 0 for none. Of this program: another standard library has
+/// other hashes.
+std::size_t mask_hash(const cv::Mat& mask) {
+  if (mask.empty()) return 0;
+  const cv::Mat bytes = mask.isContinuous() ? mask : mask.clone();
+  return std::hash<std::string_view>()({bytes.ptr<char>(), bytes.total() * bytes.elemSize()});
+}
+
+}  // namespace
+
 Json to_json(const ws::View& view) {
   const ws::Camera& c = view.camera;
   return {{"name", view.name},
@@ -33,7 +47,8 @@ Json to_json(const ws::View& view) {
           {"intrinsics", intrinsics_of(c)},
           {"max_theta", c.max_theta},
           {"world_from_camera", to_json(view.world_from_camera)},
-          {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)}};
+          {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)},
+          {"mask_hash", mask_hash(view.mask)}};
 }
 
 Json file_record(const std::filesystem::path& file) {

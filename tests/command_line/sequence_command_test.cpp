@@ -205,6 +205,18 @@ TEST_F(SequenceCommand, MasksAreTheSameFromEveryFolder) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
 }
 
+TEST_F(SequenceCommand, AReplacedMaskIsAnotherSetting) {
+  cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 20).setTo(0);
+  cv::imwrite(file("mask.png"), mask);
+  ASSERT_EQ(run(sequence() + "--count 1 --mask " + file("mask.png")).exit_code, 0);
+  cv::flip(mask, mask, 1);  // as many pixels
+  cv::imwrite(file("mask.png"), mask);
+  const Outcome outcome = run(sequence() + "--count 2 --mask " + file("mask.png"));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("views/0/mask"), std::string::npos) << outcome.output;
+}
+
 TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
   add_frame(0, "001", 8);
   const Outcome outcome = run(sequence() + "--restart-below 1 --count 2 --no-motion");
