@@ -42,6 +42,10 @@ const char* name_of(ws::CalibrationFormat format) {
       return "OpenCV";
     case ws::CalibrationFormat::euroc:
       return "EuRoC";
+    case ws::CalibrationFormat::camodocal:
+      return "CamOdoCal";
+    case ws::CalibrationFormat::vins:
+      return "VINS-Fusion";
   }
   return "";
 }
@@ -333,12 +337,12 @@ void add_calibration_command(CLI::App& app) {
 
   CLI::App* show_command =
       group->add_subcommand("show", "Print models, fields of view, baselines and rotations");
-  show_command->add_option("file", arguments->file, "Kalibr, Basalt or OpenCV file")->required();
+  show_command->add_option("file", arguments->file, RigSettings::calibration_formats)->required();
   show_command->add_flag("--json", arguments->as_json, "Print JSON");
   show_command->callback([arguments] { show(*arguments); });
 
   CLI::App* convert_command = group->add_subcommand("convert", "Write another format");
-  convert_command->add_option("input", arguments->file, "Kalibr, Basalt or OpenCV file")
+  convert_command->add_option("input", arguments->file, RigSettings::calibration_formats)
       ->required();
   convert_command->add_option("output", arguments->output, "File to write")->required();
   const auto add_format = [&arguments](CLI::App& command) {

@@ -17,9 +17,10 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
                       purpose)
       ->group(group);
   command
-      .add_option("--poses-of", of,
-                  "What the poses are of: camera (0 of the calibration) or imu (the calibration "
-                  "has T_cam_imu, T_imu_cam or T_BS); by default as the file's layout says")
+      .add_option(
+          "--poses-of", of,
+          "What the poses are of: camera (0 of the calibration) or imu (the calibration "
+          "has T_cam_imu, T_imu_cam, T_BS or body_T_cam0); by default as the file's layout says")
       ->check(CLI::IsMember({camera, imu}))
       ->needs("--poses")
       ->group(group);

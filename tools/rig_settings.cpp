@@ -13,10 +13,7 @@
 namespace ws = widestereo;
 
 void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_other) {
-  command
-      .add_option("-c,--calibration", calibration,
-                  "Kalibr camchain, Basalt JSON, OpenCV file or EuRoC folder" + or_other)
-      ->required();
+  command.add_option("-c,--calibration", calibration, calibration_formats + or_other)->required();
   add_fields_of_view_to(command);
 }
 

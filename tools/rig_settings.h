@@ -17,6 +17,10 @@ struct RigSettings {
   std::vector<std::string> masks;  ///< none, one for all images or one for each
   double max_theta = 0;            ///< degrees, 0 = as calibrated, or where images end
 
+  /// What read_calibration() reads.
+  static constexpr const char* calibration_formats =
+      "Kalibr camchain, Basalt JSON, OpenCV file, EuRoC folder, CamOdoCal camera or VINS-Fusion "
+      "configuration";
   /// What else --calibration may be where images with poses are taken, too.
   static constexpr const char* or_model =
       ", or folder of a COLMAP model, or transforms.json, whose unit distances then have";

@@ -49,10 +49,7 @@ Rig read_euroc(const std::vector<Document>& documents) {
     read_yaml(document, [&](const YAML::Node& root) {
       const YamlCamera camera(document, "cam" + std::to_string(rig.views.size()), root);
       const Eigen::Isometry3d body_from_camera = camera.motion("T_BS");
-      // The body is the IMU.
-      if (rig.views.empty()) rig.world_from_imu = body_from_camera.inverse();
-      View& view = rig.views.emplace_back(camera.view());
-      if (rig.views.size() > 1) view.world_from_camera = *rig.world_from_imu * body_from_camera;
+      add_view_of_body(rig, camera.view(), body_from_camera);
     });
   }
   return rig;

@@ -18,6 +18,10 @@ struct Document {
   [[noreturn]] void fail(const std::string& what) const;
 };
 
+/// Adds a view whose pose in a body is known. The first view's frame is the world, the body the
+/// IMU.
+void add_view_of_body(Rig& rig, View view, const Eigen::Isometry3d& body_from_camera);
+
 Rig read_kalibr(const Document& document);
 Rig read_basalt(const Document& document);
 Rig read_opencv(const Document& document, cv::Size image_size);

@@ -6,7 +6,10 @@
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
+#include <vector>
 
+#include "calibration/camodocal.h"
 #include "calibration/colmap_files.h"
 #include "calibration/euroc.h"
 #include "calibration/formats.h"
@@ -61,6 +64,15 @@ Eigen::Isometry3d rigid(const Document& document, const std::string& what,
   motion.linear() = svd.matrixU() * svd.matrixV().transpose();
   motion.translation() = translation;
   return motion;
+}
+
+void add_view_of_body(Rig& rig, View view, const Eigen::Isometry3d& body_from_camera) {
+  if (rig.views.empty()) {
+    rig.world_from_imu = body_from_camera.inverse();
+  } else {
+    view.world_from_camera = *rig.world_from_imu * body_from_camera;
+  }
+  rig.views.push_back(std::move(view));
 }
 
 namespace {
@@ -161,6 +173,7 @@ void refuse_polynomials(const Document& document) {
   constexpr std::pair<const char*, const char*> words[] = {{"ocam_model", "an OCam"},
                                                            {"Camera.nrpol", "an OCam"},
                                                            {"unprojection:", "an OCam"},
+                                                           {"poly_parameters", "an OCam"},
                                                            {"\"radial_poly\"", "a WoodScape"}};
   for (const auto& [word, owner] : words) {
     if (!contains(document, word)) continue;
@@ -173,17 +186,31 @@ void refuse_polynomials(const Document& document) {
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
+  if (is_vins(document)) return CalibrationFormat::vins;
   if (contains(document, "opencv-matrix") || contains(document, "<opencv_storage")) {
     return CalibrationFormat::opencv;
   }
   refuse_polynomials(document);
+  if (is_camodocal(document)) return CalibrationFormat::camodocal;
   if (document.text[first] == '{') return CalibrationFormat::basalt;
   if (contains(document, "cam0:")) return CalibrationFormat::kalibr;
   if (contains(document, "T_BS")) return CalibrationFormat::euroc;
   if (contains(document, "camera_model")) return CalibrationFormat::kalibr;
   document.fail(
       "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
-      "(JSON), an OpenCV FileStorage or EuRoC's sensor.yaml.");
+      "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a CamOdoCal camera or a VINS-Fusion "
+      "configuration.");
+}
+
+/// What a VINS-Fusion configuration names.
+std::vector<Document> load_cameras(const Document& configuration) {
+  std::vector<Document> cameras;
+  for (const std::filesystem::path& file : vins_files(configuration)) {
+    cameras.push_back(load(file));
+    require_shallow(cameras.back());
+    refuse_polynomials(cameras.back());
+  }
+  return cameras;
 }
 
 }  // namespace
@@ -210,6 +237,12 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       break;
     case CalibrationFormat::euroc:
       result.rig = read_euroc(documents);
+      break;
+    case CalibrationFormat::camodocal:
+      result.rig = read_camodocal(documents[0]);
+      break;
+    case CalibrationFormat::vins:
+      result.rig = read_vins(documents[0], load_cameras(documents[0]));
       break;
   }
   validate(result.rig, path.string());

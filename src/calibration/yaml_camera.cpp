@@ -39,8 +39,8 @@ void read_yaml(const Document& document, const std::function<void(const YAML::No
     const YAML::Node root = YAML::Load(without_directive(document.text));
     if (!root.IsMap()) {
       document.fail(
-          "It holds no keys such as cam0 or camera_model; give a Kalibr camchain or EuRoC's "
-          "sensor.yaml.");
+          "It holds no keys such as cam0 or camera_model; give a Kalibr camchain, EuRoC's "
+          "sensor.yaml, a CamOdoCal camera or a VINS-Fusion configuration.");
     }
     require_single_keys(document, root, "");
     read(root);
@@ -64,6 +64,20 @@ std::string YamlCamera::text(const char* key, const char* otherwise) const {
   if (!has(key) || !node_[key].IsScalar()) fail(std::string("The key ") + key + " is missing.");
   return node_[key].Scalar();
 }
+
+double YamlCamera::number(const char* key) const {
+  if (!has(key)) fail(std::string("The key ") + key + " is missing.");
+  return number(node_[key], key);
+}
+
+int YamlCamera::side(double value, const char* key) const {
+  if (value < 1 || value > 1e6 || value != std::floor(value)) {
+    fail(std::string("The key ") + key + " must hold whole numbers of pixels.");
+  }
+  return static_cast<int>(value);
+}
+
+int YamlCamera::side(const char* key) const { return side(number(key), key); }
 
 double YamlCamera::number(const YAML::Node& node, const char* key) const {
   // yaml-cpp would read and write numbers by the locale.
@@ -210,13 +224,8 @@ void YamlCamera::set_distortion(Camera& camera) const {
 
 void YamlCamera::set_resolution(Camera& camera) const {
   const std::vector<double> resolution = numbers("resolution", 2);
-  for (const double side : resolution) {
-    if (side < 1 || side > 1e6 || side != std::floor(side)) {
-      fail("The key resolution must hold two whole numbers of pixels.");
-    }
-  }
-  camera.width = static_cast<int>(resolution[0]);
-  camera.height = static_cast<int>(resolution[1]);
+  camera.width = side(resolution[0], "resolution");
+  camera.height = side(resolution[1], "resolution");
 }
 
 }  // namespace widestereo::calibration

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Cameras in YAML, with the keys that Kalibr and EuRoC's data sets share.
+// Cameras in YAML, with the keys that Kalibr and EuRoC's data sets share, and values by their keys.
 #pragma once
 
 #include <yaml-cpp/yaml.h>
@@ -26,11 +26,16 @@ class YamlCamera {
   /// The camera without its pose.
   View view() const;
   bool has(const char* key) const;
+  /// Throws Error where the key is missing, unless there is something to take instead.
+  std::string text(const char* key, const char* otherwise = nullptr) const;
+  double number(const char* key) const;
+  /// Pixels of an image's side.
+  int side(const char* key) const;
   Eigen::Isometry3d motion(const char* key) const;
 
  private:
   [[noreturn]] void fail(const std::string& what) const;
-  std::string text(const char* key, const char* otherwise = nullptr) const;
+  int side(double value, const char* key) const;
   std::vector<double> numbers(const YAML::Node& list, const char* key) const;
   /// Surplus numbers may only be zeros: what another one means would be lost.
   std::vector<double> numbers(const char* key, std::size_t count) const;

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+#include "calibration/camodocal.h"
+
+#include <initializer_list>
+#include <string>
+#include <utility>
+
+#include "calibration/yaml_camera.h"
+
+namespace widestereo::calibration {
+namespace {
+
+using Member = std::pair<const char*, double Camera::*>;
+
+/// A map of the file, by names that tell the camera and the map.
+YamlCamera part_of(const Document& document, const std::string& name, const YAML::Node& root,
+                   const char* key) {
+  if (!root[key]) document.fail(name + ": The key " + key + " is missing.");
+  return {document, name + ": " + key, root[key]};
+}
+
+void read_numbers(const YamlCamera& part, Camera& camera, std::initializer_list<Member> members) {
+  for (const auto& [key, member] : members) camera.*member = part.number(key);
+}
+
+View read_view(const Document& document, const std::string& name) {
+  using C = Camera;
+  View view;
+  view.name = name;
+  read_yaml(document, [&](const YAML::Node& root) {
+    const YamlCamera keys(document, name, root);
+    Camera& camera = view.camera;
+    const std::string model = keys.text("model_type");
+    const auto part = [&](const char* key) { return part_of(document, name, root, key); };
+    constexpr const char* projection = "projection_parameters";
+    constexpr const char* distortion = "distortion_parameters";
+    if (model == "KANNALA_BRANDT") {
+      camera.model = CameraModel::kannala_brandt;
+      // Its k1, of the angle itself, is 1.
+      read_numbers(part(projection), camera,
+                   {{"k2", &C::k1},
+                    {"k3", &C::k2},
+                    {"k4", &C::k3},
+                    {"k5", &C::k4},
+                    {"mu", &C::fx},
+                    {"mv", &C::fy},
+                    {"u0", &C::cx},
+                    {"v0", &C::cy}});
+    } else if (model == "MEI") {
+      camera.model = CameraModel::mei;
+      read_numbers(part("mirror_parameters"), camera, {{"xi", &C::xi}});
+      read_numbers(part(projection), camera,
+                   {{"gamma1", &C::fx}, {"gamma2", &C::fy}, {"u0", &C::cx}, {"v0", &C::cy}});
+    } else if (model == "PINHOLE" || model == "PINHOLE_FULL") {
+      camera.model = CameraModel::pinhole_radtan;
+      read_numbers(part(projection), camera,
+                   {{"fx", &C::fx}, {"fy", &C::fy}, {"cx", &C::cx}, {"cy", &C::cy}});
+    } else {
+      document.fail(name + ": The model_type \"" + model +
+                    "\" is not supported; use KANNALA_BRANDT, MEI, PINHOLE or PINHOLE_FULL.");
+    }
+    if (model != "KANNALA_BRANDT") {
+      read_numbers(part(distortion), camera,
+                   {{"k1", &C::k1}, {"k2", &C::k2}, {"p1", &C::p1}, {"p2", &C::p2}});
+    }
+    if (model == "PINHOLE_FULL") {
+      camera.model = CameraModel::pinhole_rational;
+      read_numbers(part(distortion), camera,
+                   {{"k3", &C::k3}, {"k4", &C::k4}, {"k5", &C::k5}, {"k6", &C::k6}});
+      camera = simplified(camera);
+    }
+    camera.width = keys.side("image_width");
+    camera.height = keys.side("image_height");
+  });
+  return view;
+}
+
+std::string numbered(const char* before, std::size_t i, const char* after) {
+  return before + std::to_string(i) + after;
+}
+
+}  // namespace
+
+bool is_vins(const Document& document) {
+  return document.text.find("cam0_calib") != std::string::npos;
+}
+
+std::vector<std::filesystem::path> vins_files(const Document& document) {
+  std::vector<std::filesystem::path> files;
+  read_yaml(document, [&](const YAML::Node& root) {
+    const YamlCamera keys(document, "VINS-Fusion", root);
+    while (keys.has(numbered("cam", files.size(), "_calib").c_str())) {
+      const std::string file = keys.text(numbered("cam", files.size(), "_calib").c_str());
+      files.push_back(document.path.parent_path() / file);
+    }
+    const std::string stated = keys.text("num_of_cam", "");
+    if (!stated.empty() && stated != std::to_string(files.size())) {
+      document.fail("The key num_of_cam says " + stated + ", but cam0_calib and the next name " +
+                    std::to_string(files.size()) + "; correct one.");
+    }
+  });
+  return files;
+}
+
+Rig read_vins(const Document& document, const std::vector<Document>& cameras) {
+  Rig rig;
+  read_yaml(document, [&](const YAML::Node& root) {
+    const YamlCamera keys(document, "VINS-Fusion", root);
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      add_view_of_body(rig, read_view(cameras[i], numbered("cam", i, "")),
+                       keys.motion(numbered("body_T_cam", i, "").c_str()));
+    }
+    if (keys.text("imu", "1") == "0") rig.world_from_imu.reset();
+  });
+  return rig;
+}
+
+bool is_camodocal(const Document& document) {
+  return document.text.find("model_type") != std::string::npos &&
+         document.text.find("projection_parameters") != std::string::npos;
+}
+
+Rig read_camodocal(const Document& document) {
+  Rig rig;
+  rig.views.push_back(read_view(document, "cam0"));
+  return rig;
+}
+
+}  // namespace widestereo::calibration

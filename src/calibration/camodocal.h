@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT
+// Cameras of CamOdoCal (one file each; KITTI-360's fisheyes) and rigs of VINS-Fusion, whose
+// configuration names such files and says where the cameras are. Format: the two projects' sources.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "calibration/formats.h"
+
+namespace widestereo::calibration {
+
+/// Whether a document is a VINS-Fusion configuration.
+bool is_vins(const Document& document);
+/// Its cameras' files, cam0_calib, cam1_calib, ..., beside it unless absolute. Throws Error naming
+/// the key.
+std::vector<std::filesystem::path> vins_files(const Document& document);
+/// The rig of a configuration and its cameras' files. Throws Error naming the file and the key.
+Rig read_vins(const Document& document, const std::vector<Document>& cameras);
+
+/// Whether a document is a camera of CamOdoCal.
+bool is_camodocal(const Document& document);
+/// A rig of one camera. Throws Error naming the file and the key.
+Rig read_camodocal(const Document& document);
+
+}  // namespace widestereo::calibration
