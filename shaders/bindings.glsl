@@ -4,8 +4,8 @@
 // levels, in which coarse views share layers (src/vulkan/atlas.h).
 //
 // Every kernel is compiled twice, for images that are read with the same bits. GPUs gather or filter four texels in one
-// instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe);
-// what they load of half pixels are four in one texel, in a third of the time of four texels.
+// instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
+// and have the four half pixels of a sample in one texel, which takes them much less than four texels of one.
 
 // Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
 layout(local_size_x = 8, local_size_y = 8) in;
