@@ -186,12 +186,13 @@ void refuse_polynomials(const Document& document) {
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
+  refuse_polynomials(document);
   if (is_vins(document)) return CalibrationFormat::vins;
+  // Configurations of VINS-Mono are a camera of CamOdoCal with more keys, some of them matrices.
+  if (is_camodocal(document)) return CalibrationFormat::camodocal;
   if (contains(document, "opencv-matrix") || contains(document, "<opencv_storage")) {
     return CalibrationFormat::opencv;
   }
-  refuse_polynomials(document);
-  if (is_camodocal(document)) return CalibrationFormat::camodocal;
   if (document.text[first] == '{') return CalibrationFormat::basalt;
   if (contains(document, "cam0:")) return CalibrationFormat::kalibr;
   if (contains(document, "T_BS")) return CalibrationFormat::euroc;

@@ -116,6 +116,14 @@ TEST(CamOdoCal, ReadsPinholes) {
                      701 * (y * radial + 1e-4 * (q + 2 * y * y) + 4e-4 * x * y) + 689});
 }
 
+TEST(CamOdoCal, MayBePartOfAConfiguration) {
+  // VINS-Mono's.
+  const Camera camera = camera_of(pinhole +
+                                  "extrinsicRotation: !!opencv-matrix\n   rows: 3\n   cols: 3\n"
+                                  "   dt: d\n   data: [0, -1, 0, 1, 0, 0, 0, 0, 1]\n");
+  EXPECT_EQ(camera.k1, -0.28);
+}
+
 /// Cameras 11 cm apart that look along the body's x, with the body's z up.
 std::string vins(const std::string& more = "imu: 1\nnum_of_cam: 2\n") {
   const auto pose = [](const std::string& name, const std::string& y) {
