@@ -75,40 +75,27 @@ View read_view(const Document& document, const std::string& name) {
   return view;
 }
 
-std::string numbered(const char* before, std::size_t i, const char* after) {
-  return before + std::to_string(i) + after;
-}
-
 }  // namespace
 
 bool is_vins(const Document& document) {
   return document.text.find("cam0_calib") != std::string::npos;
 }
 
-std::vector<std::filesystem::path> vins_files(const Document& document) {
-  std::vector<std::filesystem::path> files;
-  read_yaml(document, [&](const YAML::Node& root) {
-    const YamlCamera keys(document, "VINS-Fusion", root);
-    while (keys.has(numbered("cam", files.size(), "_calib").c_str())) {
-      const std::string file = keys.text(numbered("cam", files.size(), "_calib").c_str());
-      files.push_back(document.path.parent_path() / file);
-    }
-    const std::string stated = keys.text("num_of_cam", "");
-    if (!stated.empty() && stated != std::to_string(files.size())) {
-      document.fail("The key num_of_cam says " + stated + ", but cam0_calib and the next name " +
-                    std::to_string(files.size()) + "; correct one.");
-    }
-  });
-  return files;
-}
-
-Rig read_vins(const Document& document, const std::vector<Document>& cameras) {
+Rig read_vins(const Document& document,
+              const std::function<Document(const std::filesystem::path&)>& load) {
   Rig rig;
   read_yaml(document, [&](const YAML::Node& root) {
     const YamlCamera keys(document, "VINS-Fusion", root);
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      add_view_of_body(rig, read_view(cameras[i], numbered("cam", i, "")),
-                       keys.motion(numbered("body_T_cam", i, "").c_str()));
+    const auto next = [&rig] { return "cam" + std::to_string(rig.views.size()); };
+    for (std::string key = next() + "_calib"; keys.has(key.c_str()); key = next() + "_calib") {
+      const Document camera = load(document.path.parent_path() / keys.text(key.c_str()));
+      add_view_of_body(rig, read_view(camera, next()), keys.motion(("body_T_" + next()).c_str()));
+    }
+    const std::string found = std::to_string(rig.views.size());
+    const std::string stated = keys.text("num_of_cam", found.c_str());
+    if (stated != found) {
+      document.fail("The key num_of_cam says " + stated + ", but cam0_calib and the next name " +
+                    found + "; correct one.");
     }
     if (keys.text("imu", "1") == "0") rig.world_from_imu.reset();
   });

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <filesystem>
-#include <vector>
+#include <functional>
 
 #include "calibration/formats.h"
 
@@ -12,11 +12,10 @@ namespace widestereo::calibration {
 
 /// Whether a document is a VINS-Fusion configuration.
 bool is_vins(const Document& document);
-/// Its cameras' files, cam0_calib, cam1_calib, ..., beside it unless absolute. Throws Error naming
-/// the key.
-std::vector<std::filesystem::path> vins_files(const Document& document);
-/// The rig of a configuration and its cameras' files. Throws Error naming the file and the key.
-Rig read_vins(const Document& document, const std::vector<Document>& cameras);
+/// Its rig. `load` reads the cameras' files, cam0_calib, cam1_calib, ..., which lie beside it
+/// unless their paths are absolute. Throws Error naming the file and the key.
+Rig read_vins(const Document& document,
+              const std::function<Document(const std::filesystem::path&)>& load);
 
 /// Whether a document is a camera of CamOdoCal.
 bool is_camodocal(const Document& document);

@@ -7,7 +7,6 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "calibration/camodocal.h"
 #include "calibration/colmap_files.h"
@@ -203,15 +202,12 @@ CalibrationFormat format_of(const Document& document) {
       "configuration.");
 }
 
-/// What a VINS-Fusion configuration names.
-std::vector<Document> load_cameras(const Document& configuration) {
-  std::vector<Document> cameras;
-  for (const std::filesystem::path& file : vins_files(configuration)) {
-    cameras.push_back(load(file));
-    require_shallow(cameras.back());
-    refuse_polynomials(cameras.back());
-  }
-  return cameras;
+/// A file that another one names.
+Document load_camera(const std::filesystem::path& path) {
+  Document document = load(path);
+  require_shallow(document);
+  refuse_polynomials(document);
+  return document;
 }
 
 }  // namespace
@@ -243,7 +239,7 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       result.rig = read_camodocal(documents[0]);
       break;
     case CalibrationFormat::vins:
-      result.rig = read_vins(documents[0], load_cameras(documents[0]));
+      result.rig = read_vins(documents[0], load_camera);
       break;
   }
   validate(result.rig, path.string());

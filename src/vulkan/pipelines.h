@@ -48,6 +48,7 @@ class Pipelines {
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);
 
+  bool sampled() const { return sampled_; }
   VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
   VkPipelineLayout layout() const { return layout_.get(); }
   /// Throws Error for iterate_raster.

@@ -119,8 +119,8 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
-      sampled_(tuning.sampled.value_or(!runs_on_cpu(context))),
-      pipelines_(make_pipelines(context, constants, sampled_, cache.get())),
+      pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
+                                cache.get())),
       map_atlas_(pack_views(sizes, 0)),
       intensity_atlas_(pack_views(sizes, APRON)),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
@@ -158,7 +158,7 @@ void VulkanBackend::make_images(const VulkanContext& context) {
   const auto views = static_cast<std::size_t>(views_of_level());
   for (std::size_t first = 0; first < sizes.size(); first += views) {
     half_pixels_.push_back(
-        make_intensities(sampled_ ? intensity_format : format_of_loaded_half_pixels,
+        make_intensities(pipelines_.sampled() ? intensity_format : format_of_loaded_half_pixels,
                          size_of_half_pixels(largest(sizes.subspan(first, views))),
                          views_of_level(), "the images at half pixels"));
   }

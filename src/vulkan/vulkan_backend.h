@@ -84,7 +84,6 @@ class VulkanBackend final : public Backend {
   std::vector<cv::Size> sizes_;
   KernelConstants constants_;
   long long max_samples_;
-  bool sampled_;  // through texture units: VulkanTuning
   Pipelines pipelines_;
   Atlas map_atlas_;
   Atlas intensity_atlas_;
