@@ -136,7 +136,8 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     x = distorted.x;
     y = distorted.y;
   }
-  pixel = real2(camera.intrinsics.x * x + camera.domain.z * y + camera.intrinsics.z,
+  // Skew last: where x and y share a factor, Mesa would make one product of two, with other bits.
+  pixel = real2((camera.intrinsics.x * x + camera.intrinsics.z) + camera.domain.z * y,
                 camera.intrinsics.y * y + camera.intrinsics.w);
   return inside;
 }

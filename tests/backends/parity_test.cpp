@@ -228,6 +228,7 @@ Rig rig_of_model(CameraModel model, int size) {
     c.s2 = -0.002;
     c.s3 = -0.005;
     c.s4 = 0.001;
+    c.skew = -0.7;
   }
   return rig;
 }
