@@ -15,24 +15,30 @@
 #define CAMERA_PINHOLE_RATIONAL 9
 #define CAMERA_THIN_PRISM_FISHEYE 10
 #define CAMERA_RAD_TAN_THIN_PRISM_FISHEYE 11
+#define CAMERA_POLYNOMIAL_FISHEYE 12
+
+// Angle about which polynomial_fisheye is expanded: powers of the angle itself cancel out, beyond single precision.
+#define POLYNOMIAL_CENTRE 1.25f
 
 // std140: six 16-byte rows.
 struct CameraParameters {
   real4 intrinsics;  // fx, fy, cx, cy in pixels
   // fisheyes, pinhole_rational: k1..k4; double_sphere: xi, alpha, w1; unified, mei: xi, min(xi, 1/xi);
-  // extended_unified: alpha, beta, w; field_of_view: omega, 2 tan(omega / 2)
+  // extended_unified: alpha, beta, w; field_of_view: omega, 2 tan(omega / 2);
+  // polynomial_fisheye: coefficients of theta - POLYNOMIAL_CENTRE, lowest power first, up to prism
   real4 shape;
-  real4 distortion;  // radtan: k1, k2, p1, p2; where k1 and k2 are in shape: k5, k6, p1, p2
-  real4 prism;       // s1..s4
+  // radtan: k1, k2, p1, p2; where k1 and k2 are in shape: k5, k6, p1, p2
+  real4 distortion;
+  real4 prism;  // s1..s4
   // cosine of the field of view's half angle; the largest theta (fisheyes) or squared undistorted
-  // radius (others) up to which the distortion increases; skew; radtan: k3
+  // radius (others) up to which the distortion increases; skew; radtan: k3; polynomial_fisheye: shear
   real4 domain;
   ivec4 size;  // width, height, model, 0
 };
 
 FN bool is_fisheye(int model) {
   return model == CAMERA_KANNALA_BRANDT || model == CAMERA_THIN_PRISM_FISHEYE ||
-         model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE;
+         model == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE || model == CAMERA_POLYNOMIAL_FISHEYE;
 }
 
 // Those with k1 to k6 and thin prisms.
@@ -63,6 +69,21 @@ FN real radial_distortion(CameraParameters camera, int model, real q) {
          q * (camera.shape.x + q * (camera.shape.y + q * (camera.shape.z + q * last)));
 }
 
+// Radius on a fisheye's normalised plane at an angle; thin_prism_fisheye distorts the angle later.
+FN real fisheye_radius(CameraParameters camera, int model, real theta) {
+  if (model == CAMERA_THIN_PRISM_FISHEYE) return theta;
+  if (model == CAMERA_POLYNOMIAL_FISHEYE) {
+    real4 a = camera.shape;
+    real4 b = camera.distortion;
+    real4 c = camera.prism;
+    real t = theta - real(POLYNOMIAL_CENTRE);
+    real high = c.x + t * (c.y + t * (c.z + t * c.w));
+    real middle = b.x + t * (b.y + t * (b.z + t * (b.w + t * high)));
+    return theta * (a.x + t * (a.y + t * (a.z + t * (a.w + t * middle))));
+  }
+  return theta * radial_distortion(camera, model, theta * theta);
+}
+
 // Brown-Conrady distortion, with thin prisms where the model has them, of a point on the normalised plane (of a
 // fisheye: in angles; of rad_tan_thin_prism_fisheye after radial distortion).
 FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
@@ -90,10 +111,7 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
   if (is_fisheye(model)) {
     real rho = sqrt(rho2);
     real theta = arc_tangent(rho, point.z);
-    real distorted = theta;
-    if (model != CAMERA_THIN_PRISM_FISHEYE) {
-      distorted = theta * radial_distortion(camera, model, theta * theta);
-    }
+    real distorted = fisheye_radius(camera, model, theta);
     inside = inside && theta < camera.domain.y;
     real scale = rho > real(0) ? distorted / rho : real(1) / point.z;
     x = point.x * scale;
@@ -136,8 +154,9 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     x = distorted.x;
     y = distorted.y;
   }
-  // Skew last: where x and y share a factor, Mesa would make one product of two, with other bits.
+  // Skew and shear last: where x and y share a factor, Mesa would make one product of two, with other bits.
   pixel = real2((camera.intrinsics.x * x + camera.intrinsics.z) + camera.domain.z * y,
                 camera.intrinsics.y * y + camera.intrinsics.w);
+  if (model == CAMERA_POLYNOMIAL_FISHEYE) pixel.y = pixel.y + camera.domain.w * x;
   return inside;
 }

@@ -32,10 +32,12 @@ enum class CameraModel : int {
   thin_prism_fisheye = 10,
   /// theta (1 + k1 theta^2 + ... + k6 theta^12), then p1 p2 and s1..s4: Project Aria (Fisheye624)
   rad_tan_thin_prism_fisheye = 11,
+  /// theta (1 + k1 theta + k2 theta^2 + ... + k11 theta^11): OCam (Scaramuzza), WoodScape
+  polynomial_fisheye = 12,
 };
 
 /// Number of camera models, which are counted from 0.
-inline constexpr int camera_models = 12;
+inline constexpr int camera_models = 13;
 
 /// The model's name as used in messages, JSON and --help, for example "kannala_brandt".
 std::string to_string(CameraModel model);
@@ -47,12 +49,14 @@ struct Camera {
   int height = 0;                         ///< pixels
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels; (0, 0) is the centre of the top left pixel
   double skew = 0;                        ///< pixels: u = fx m_x + skew m_y + cx (K(0,1) of OpenCV)
-  double xi = 0;                          ///< double_sphere, unified, mei
-  double alpha = 0;                       ///< double_sphere, extended_unified
-  double beta = 1;                        ///< extended_unified
-  double omega = 0;                       ///< field_of_view, radians
+  double shear = 0;  ///< pixels: v = fy m_y + shear m_x + cy; polynomial_fisheye
+  double xi = 0;     ///< double_sphere, unified, mei
+  double alpha = 0;  ///< double_sphere, extended_unified
+  double beta = 1;   ///< extended_unified
+  double omega = 0;  ///< field_of_view, radians
   /// Radial; radtan and mei: k1 k2 (k3); pinhole_rational: k4..k6 of the denominator.
   double k1 = 0, k2 = 0, k3 = 0, k4 = 0, k5 = 0, k6 = 0;
+  double k7 = 0, k8 = 0, k9 = 0, k10 = 0, k11 = 0;  ///< polynomial_fisheye
   double p1 = 0, p2 = 0;  ///< tangential, in OpenCV's order: p2 (r^2 + 2 x^2) is of x
   /// Thin prisms, in OpenCV's order: s1 r^2 + s2 r^4 of x, s3 r^2 + s4 r^4 of y.
   double s1 = 0, s2 = 0, s3 = 0, s4 = 0;

@@ -117,6 +117,7 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
     case CameraModel::pinhole_rational:
     case CameraModel::thin_prism_fisheye:
     case CameraModel::rad_tan_thin_prism_fisheye:
+    case CameraModel::polynomial_fisheye:
       break;
   }
   throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +

@@ -164,11 +164,10 @@ class Refinement {
           rig_.views[0].world_from_camera.translation() + before.norm() * direction.normalized();
     }
     const double scale = std::exp(update(focal));
-    view.camera.fx *= scale;
-    view.camera.fy *= scale;
-    view.camera.skew *= scale;
-    view.camera.cx += update(centre);
-    view.camera.cy += update(centre + 1);
+    Camera& camera = view.camera;
+    for (double* scaled : {&camera.fx, &camera.fy, &camera.skew, &camera.shear}) *scaled *= scale;
+    camera.cx += update(centre);
+    camera.cy += update(centre + 1);
   }
 
   std::vector<Residual> residuals() const {

@@ -75,9 +75,17 @@ std::pair<double, double> radial_residual(const kernel::dual::CameraParameters& 
   return {distorted.value - target, distorted.derivative.x()};
 }
 
-/// theta whose radially distorted radius is r, or a negative number beyond the model's limit.
+/// A fisheye's radius at an angle less `target`, and its slope.
+std::pair<double, double> fisheye_residual(const kernel::dual::CameraParameters& p, double theta,
+                                           double target) {
+  const Dual radius =
+      kernel::dual::fisheye_radius(p, p.size.z, Dual(theta, Eigen::RowVector3d::UnitX()));
+  return {radius.value - target, radius.derivative.x()};
+}
+
+/// theta of a radius r on the normalised plane, or a negative number beyond the model's limit.
 double fisheye_theta(const kernel::dual::CameraParameters& p, double r) {
-  const auto value_and_slope = [&](double theta) { return radial_residual(p, theta, r); };
+  const auto value_and_slope = [&](double theta) { return fisheye_residual(p, theta, r); };
   const double limit = p.domain.y.value;
   if (value_and_slope(limit).first < 0) return -1;
   return increasing_root(value_and_slope, 0, limit, r);
@@ -86,7 +94,7 @@ double fisheye_theta(const kernel::dual::CameraParameters& p, double r) {
 /// End of the domain of distort(), a radius.
 double distortion_limit(const kernel::dual::CameraParameters& p) {
   const double limit = p.domain.y.value;
-  if (p.size.z == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) return radial_residual(p, limit, 0).first;
+  if (p.size.z == CAMERA_RAD_TAN_THIN_PRISM_FISHEYE) return fisheye_residual(p, limit, 0).first;
   return kernel::dual::is_fisheye(p.size.z) ? limit : std::sqrt(limit);
 }
 
@@ -154,7 +162,8 @@ bool direction_of(const Camera& c, const kernel::dual::CameraParameters& p, Vect
       return true;
     case CameraModel::kannala_brandt:
     case CameraModel::thin_prism_fisheye:
-    case CameraModel::rad_tan_thin_prism_fisheye: {
+    case CameraModel::rad_tan_thin_prism_fisheye:
+    case CameraModel::polynomial_fisheye: {
       const double theta = c.model == CameraModel::thin_prism_fisheye ? r : fisheye_theta(p, r);
       if (theta < 0) return false;
       direction << (r > 0 ? std::sin(theta) / r : 1.0) * m, std::cos(theta);
@@ -207,9 +216,10 @@ std::string size_text(int width, int height) {
 
 std::string to_string(CameraModel model) {
   static const std::array<const char*, camera_models> names = {
-      "pinhole",         "pinhole_radtan",   "kannala_brandt",     "double_sphere",
-      "unified",         "extended_unified", "field_of_view",      "mei",
-      "equirectangular", "pinhole_rational", "thin_prism_fisheye", "rad_tan_thin_prism_fisheye"};
+      "pinhole",           "pinhole_radtan",   "kannala_brandt",     "double_sphere",
+      "unified",           "extended_unified", "field_of_view",      "mei",
+      "equirectangular",   "pinhole_rational", "thin_prism_fisheye", "rad_tan_thin_prism_fisheye",
+      "polynomial_fisheye"};
   const auto index = static_cast<std::size_t>(model);
   if (index >= names.size()) {
     throw Error("The camera model number " + std::to_string(static_cast<int>(model)) +
@@ -221,12 +231,13 @@ std::string to_string(CameraModel model) {
 std::span<const Intrinsic> intrinsics() {
   using C = Camera;
   static constexpr Intrinsic all[] = {
-      {"fx", &C::fx},       {"fy", &C::fy}, {"cx", &C::cx},       {"cy", &C::cy},
-      {"skew", &C::skew},   {"xi", &C::xi}, {"alpha", &C::alpha}, {"beta", &C::beta},
-      {"omega", &C::omega}, {"k1", &C::k1}, {"k2", &C::k2},       {"k3", &C::k3},
-      {"k4", &C::k4},       {"k5", &C::k5}, {"k6", &C::k6},       {"p1", &C::p1},
-      {"p2", &C::p2},       {"s1", &C::s1}, {"s2", &C::s2},       {"s3", &C::s3},
-      {"s4", &C::s4}};
+      {"fx", &C::fx},     {"fy", &C::fy},       {"cx", &C::cx}, {"cy", &C::cy},
+      {"skew", &C::skew}, {"shear", &C::shear}, {"xi", &C::xi}, {"alpha", &C::alpha},
+      {"beta", &C::beta}, {"omega", &C::omega}, {"k1", &C::k1}, {"k2", &C::k2},
+      {"k3", &C::k3},     {"k4", &C::k4},       {"k5", &C::k5}, {"k6", &C::k6},
+      {"k7", &C::k7},     {"k8", &C::k8},       {"k9", &C::k9}, {"k10", &C::k10},
+      {"k11", &C::k11},   {"p1", &C::p1},       {"p2", &C::p2}, {"s1", &C::s1},
+      {"s2", &C::s2},     {"s3", &C::s3},       {"s4", &C::s4}};
   return all;
 }
 
@@ -275,8 +286,10 @@ bool PreparedCamera::project(const Vector3d& point, Vector2d& pixel,
 bool PreparedCamera::unproject(const Vector2d& pixel, Vector3d& ray) const {
   const Camera& c = implementation_->camera;
   Vector2d m;
-  m.y() = (pixel.y() - c.cy) / c.fy;
-  m.x() = (pixel.x() - c.cx - c.skew * m.y()) / c.fx;
+  const Vector2d offset(pixel.x() - c.cx, pixel.y() - c.cy);
+  const double slant = c.shear / c.fx;
+  m.y() = (offset.y() - slant * offset.x()) / (c.fy - slant * c.skew);
+  m.x() = (offset.x() - c.skew * m.y()) / c.fx;
   if (!direction_of(c, implementation_->dual, m, ray)) return false;
   ray.normalize();
   // Projecting back checks the domain and the field of view and catches every way of not
@@ -333,6 +346,7 @@ Camera resized(const Camera& camera, int width, int height) {
   result.fx *= sx;
   result.fy *= sy;
   result.skew *= sx;
+  result.shear *= sy;
   result.cx = sx * (camera.cx + 0.5) - 0.5;
   result.cy = sy * (camera.cy + 0.5) - 0.5;
   return result;

@@ -146,6 +146,28 @@ double rad_tan_thin_prism_limit(const Camera& c) {
   return inside;
 }
 
+/// Coefficients of 1 + k1 theta + ... + k11 theta^11, lowest power first.
+Eigen::Vector<double, 12> angle_polynomial(const Camera& c) {
+  Eigen::Vector<double, 12> k;
+  k << 1, c.k1, c.k2, c.k3, c.k4, c.k5, c.k6, c.k7, c.k8, c.k9, c.k10, c.k11;
+  return k;
+}
+
+/// Largest theta up to which theta times that increases, at most pi.
+double polynomial_limit(const Camera& c) {
+  const Eigen::Vector<double, 12> powers = Eigen::Vector<double, 12>::LinSpaced(1, 12);
+  const Eigen::Vector<double, 12> derivative = angle_polynomial(c).cwiseProduct(powers);
+  return std::min(std::numbers::pi, smallest_positive_root(derivative.tail<11>()));
+}
+
+/// The polynomial's coefficients in powers of theta - centre, by repeated division.
+Eigen::Vector<double, 12> expanded_about(double centre, Eigen::Vector<double, 12> k) {
+  for (int done = 0; done < 11; ++done) {
+    for (int i = 10; i >= done; --i) k[i] += centre * k[i + 1];
+  }
+  return k;
+}
+
 /// The domain factor w of the sphere models: alpha / (1 - alpha) or its inverse, at most 1.
 double sphere_factor(double alpha) {
   return alpha <= 0.5 ? alpha / (1 - alpha) : (1 - alpha) / alpha;
@@ -182,6 +204,15 @@ Parameters fill(const Camera& c) {
       set_radial<Real>(p, c);
       limit = rad_tan_thin_prism_limit(c);
       break;
+    case CameraModel::polynomial_fisheye: {
+      const Eigen::Vector<Real, 12> k =
+          expanded_about(POLYNOMIAL_CENTRE, angle_polynomial(c)).template cast<Real>();
+      p.shape = {k[0], k[1], k[2], k[3]};
+      p.distortion = {k[4], k[5], k[6], k[7]};
+      p.prism = {k[8], k[9], k[10], k[11]};
+      limit = polynomial_limit(c);
+      break;
+    }
     case CameraModel::double_sphere:
       p.shape = {real(c.xi), real(c.alpha), real(sphere_factor(c.alpha)), 0};
       break;
@@ -200,7 +231,8 @@ Parameters fill(const Camera& c) {
   }
   // -2: every direction, whatever rounding does to cos(pi).
   const double cosine = c.max_theta >= std::numbers::pi ? -2 : std::cos(c.max_theta);
-  p.domain = {real(cosine), real(limit), real(c.skew), real(c.k3)};
+  const bool polynomial = c.model == CameraModel::polynomial_fisheye;
+  p.domain = {real(cosine), real(limit), real(c.skew), real(polynomial ? c.shear : c.k3)};
   p.size = {c.width, c.height, static_cast<int>(c.model), 0};
   return p;
 }

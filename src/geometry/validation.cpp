@@ -57,6 +57,8 @@ void validate(const Camera& c, const std::string& name) {
   require(c.fy > 0, name, "fy", c.fy, "it must be positive");
   require(c.max_theta > 0 && c.max_theta <= std::numbers::pi + 1e-12, name, "max_theta (radians)",
           c.max_theta, "it must lie in (0, pi]");
+  require(c.shear == 0 || c.model == CameraModel::polynomial_fisheye, name, "shear", c.shear,
+          "only polynomial_fisheye has one");
   switch (c.model) {
     case CameraModel::pinhole:
     case CameraModel::pinhole_radtan:
@@ -65,6 +67,10 @@ void validate(const Camera& c, const std::string& name) {
     case CameraModel::pinhole_rational:
     case CameraModel::thin_prism_fisheye:
     case CameraModel::rad_tan_thin_prism_fisheye:
+      break;
+    case CameraModel::polynomial_fisheye:
+      require(c.fx * c.fy > c.skew * c.shear, name, "the determinant of fx, skew, shear and fy",
+              c.fx * c.fy - c.skew * c.shear, "it must be positive");
       break;
     case CameraModel::double_sphere:
       require(c.xi > -1 && c.xi <= 1, name, "xi", c.xi, "a double sphere needs it in (-1, 1]");

@@ -22,6 +22,7 @@ static_assert(CAMERA_PINHOLE_RATIONAL == static_cast<int>(CameraModel::pinhole_r
 static_assert(CAMERA_THIN_PRISM_FISHEYE == static_cast<int>(CameraModel::thin_prism_fisheye));
 static_assert(CAMERA_RAD_TAN_THIN_PRISM_FISHEYE ==
               static_cast<int>(CameraModel::rad_tan_thin_prism_fisheye));
+static_assert(CAMERA_POLYNOMIAL_FISHEYE == static_cast<int>(CameraModel::polynomial_fisheye));
 
 static_assert(MAX_IMAGES == Matcher::most_views);
 

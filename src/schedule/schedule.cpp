@@ -68,7 +68,7 @@ View halved(const View& view) {
   Camera& camera = half.camera;
   camera.width = (camera.width + 1) / 2;
   camera.height = (camera.height + 1) / 2;
-  for (double* scaled : {&camera.fx, &camera.fy, &camera.skew}) *scaled *= 0.5;
+  for (double* scaled : {&camera.fx, &camera.fy, &camera.skew, &camera.shear}) *scaled *= 0.5;
   for (double* centre : {&camera.cx, &camera.cy}) *centre = 0.5 * (*centre + 0.5) - 0.5;
   half.mask = cv::Mat();  // masked pixels arrive with the intensities
   return half;

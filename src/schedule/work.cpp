@@ -40,7 +40,9 @@ int projection(int model) {
   constexpr int radial_of_fisheye = 8;
   constexpr int of_angle = 2;  // its square, and the product with it
   constexpr int two_more_coefficients = 4;
+  constexpr int polynomial_of_fisheye = 24;
   constexpr int to_pixels = 6;
+  constexpr int shear = 2;
   switch (static_cast<CameraModel>(model)) {
     case CameraModel::pinhole_radtan:
       return common + perspective + radial + decentring + to_pixels;
@@ -53,6 +55,8 @@ int projection(int model) {
     case CameraModel::rad_tan_thin_prism_fisheye:
       return common + fisheye + radial_of_fisheye + two_more_coefficients + of_angle + decentring +
              prisms + to_pixels;
+    case CameraModel::polynomial_fisheye:
+      return common + fisheye + polynomial_of_fisheye + to_pixels + shear;
     case CameraModel::double_sphere:
       return common + 10 + perspective + to_pixels;
     case CameraModel::unified:

@@ -172,6 +172,29 @@ std::vector<NamedCamera> cameras() {
   c.s3 = 0.0007;
   c.s4 = -0.0004;
   list.push_back({"aria_fisheye624_with_prisms", c});
+
+  // WoodScape's front camera, and LaFiDa's right one, whose polynomial was fitted by hand.
+  c = make(CameraModel::polynomial_fisheye, 1280, 966, 339.749, 339.749, 643.442, 479.407);
+  c.k1 = -31.988 / 339.749;
+  c.k2 = 48.275 / 339.749;
+  c.k3 = -7.201 / 339.749;
+  list.push_back({"woodscape_polynomial", c});
+  c = make(CameraModel::polynomial_fisheye, 754, 480, 209.125720, 209.071570, 378.722262,
+           253.625158);
+  c.k1 = -0.00728379311;
+  c.k2 = -0.0184605947;
+  c.k3 = -0.321880365;
+  c.k4 = 1.35824889;
+  c.k5 = -2.42353193;
+  c.k6 = 2.31651294;
+  c.k7 = -1.30901817;
+  c.k8 = 0.449863157;
+  c.k9 = -0.0911894685;
+  c.k10 = 0.00972937035;
+  c.k11 = -0.000390322931;
+  c.skew = -2.581874;
+  c.shear = 2.633094;
+  list.push_back({"lafida_polynomial", c});
   return list;
 }
 
@@ -421,8 +444,8 @@ Vector2d decentred(const Vector2d& radial, const Vector2d& at, const Camera& c) 
          Vector2d(c.s1 * r2 + c.s2 * r2 * r2, c.s3 * r2 + c.s4 * r2 * r2);
 }
 
-/// The point on the normalised plane of models with prisms, as their authors write them.
-Vector2d literal_with_prisms(const Camera& c, double theta, double azimuth) {
+/// The point on the normalised plane of models with more coefficients, as their authors write them.
+Vector2d literal_point(const Camera& c, double theta, double azimuth) {
   const Vector2d unit(std::cos(azimuth), std::sin(azimuth));
   if (c.model == CameraModel::pinhole_rational) {
     const Vector2d at = std::tan(theta) * unit;
@@ -432,6 +455,12 @@ Vector2d literal_with_prisms(const Camera& c, double theta, double azimuth) {
     return decentred(factor * at, at, c);
   }
   const Vector2d angle = theta * unit;
+  if (c.model == CameraModel::polynomial_fisheye) {
+    const double k[] = {c.k1, c.k2, c.k3, c.k4, c.k5, c.k6, c.k7, c.k8, c.k9, c.k10, c.k11};
+    double factor = 1;
+    for (int i = 0; i < 11; ++i) factor += k[i] * std::pow(theta, i + 1);
+    return factor * angle;
+  }
   if (c.model == CameraModel::thin_prism_fisheye) {
     return decentred(polynomial({c.k1, c.k2, c.k3, c.k4}, theta) * angle, angle, c);
   }
@@ -439,7 +468,7 @@ Vector2d literal_with_prisms(const Camera& c, double theta, double azimuth) {
   return decentred(radial, radial, c);
 }
 
-TEST(ModelFormulas, PrismsActOnTheirOwnModelsPoint) {
+TEST(ModelFormulas, AreTheirAuthors) {
   int compared = 0;
   for (const NamedCamera& named : cameras()) {
     const Camera& c = named.camera;
@@ -447,15 +476,16 @@ TEST(ModelFormulas, PrismsActOnTheirOwnModelsPoint) {
     for (int i = 1; i < 40; ++i) {
       const double theta = 0.97 * model_max_theta(c) * i / 40;
       const double azimuth = 0.7 * i;
-      const Vector2d m = literal_with_prisms(c, theta, azimuth);
+      const Vector2d m = literal_point(c, theta, azimuth);
       Vector2d pixel;
       ASSERT_TRUE(project(c, 2.5 * direction(theta, azimuth), pixel));
-      const Vector2d expected(c.fx * m.x() + c.cx, c.fy * m.y() + c.cy);
+      const Vector2d expected(c.fx * m.x() + c.skew * m.y() + c.cx,
+                              c.shear * m.x() + c.fy * m.y() + c.cy);
       EXPECT_LT((pixel - expected).norm(), 1e-12 * (1000 + expected.norm())) << named.name;
       ++compared;
     }
   }
-  EXPECT_EQ(compared, 5 * 39);
+  EXPECT_EQ(compared, 7 * 39);
 }
 
 TEST(ModelRelations, ModelsWithPrismsContainThoseWithout) {
@@ -639,10 +669,10 @@ TEST(ModelLimits, PrismsEndBeforeTheirJacobianBecomesSingular) {
         // Along and across the azimuth.
         const auto determinant = [&](double theta) {
           constexpr double h = 1e-6;
-          const Vector2d along = literal_with_prisms(c, theta + h, azimuth) -
-                                 literal_with_prisms(c, theta - h, azimuth);
-          const Vector2d across = literal_with_prisms(c, theta, azimuth + h) -
-                                  literal_with_prisms(c, theta, azimuth - h);
+          const Vector2d along =
+              literal_point(c, theta + h, azimuth) - literal_point(c, theta - h, azimuth);
+          const Vector2d across =
+              literal_point(c, theta, azimuth + h) - literal_point(c, theta, azimuth - h);
           return along.x() * across.y() - along.y() * across.x();
         };
         first = std::min(first, first_negative(determinant, first));
@@ -707,8 +737,39 @@ Camera random_camera(CameraModel model, std::mt19937& random) {
     case CameraModel::rad_tan_thin_prism_fisheye:
       draw_prism_coefficients(c, 0.1, 0.03, random);
       break;
+    case CameraModel::polynomial_fisheye:
+      c.shear = sign(random);
+      c.k1 = 0.1 * sign(random);
+      c.k2 = 0.1 * sign(random);
+      c.k3 = 0.05 * sign(random);
+      for (double Camera::*k : {&Camera::k4, &Camera::k5, &Camera::k6, &Camera::k7, &Camera::k8}) {
+        c.*k = 1e-3 * sign(random);
+      }
+      for (double Camera::*k : {&Camera::k9, &Camera::k10, &Camera::k11}) {
+        c.*k = 1e-5 * sign(random);
+      }
+      break;
   }
   return c;
+}
+
+TEST(ModelLimits, PolynomialEndsAtTheFirstRootOfTheSlope) {
+  std::mt19937 random(15);
+  int folding = 0;
+  for (int i = 0; i < 500; ++i) {
+    Camera c = random_camera(CameraModel::polynomial_fisheye, random);
+    c.k2 *= 3;
+    const auto radius = [&c](double theta) { return literal_point(c, theta, 0).x(); };
+    const auto slope = [&](double theta) { return radius(theta + 1e-6) - radius(theta - 1e-6); };
+    const double sampled = first_negative(slope, std::numbers::pi);
+    const double limit = camera_parameters(c).domain.y;
+    ASSERT_LE(limit, sampled + 1e-6);
+    if (limit == std::numbers::pi) continue;
+    ASSERT_NEAR(slope(limit), 0, 1e-10);
+    ++folding;
+  }
+  EXPECT_GT(folding, 100);
+  EXPECT_LT(folding, 400);
 }
 
 TEST(RandomCameras, RoundTripUpToTheEdgeOfTheDomain) {
