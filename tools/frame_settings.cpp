@@ -5,9 +5,16 @@
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
+namespace fs = std::filesystem;
 
 void FrameSettings::add_to(CLI::App& command) {
   const std::string group = "Frames";
+  command
+      .add_option("--folders", folders,
+                  "Folders of the cameras' images in the data set, in the order of the cameras; by "
+                  "default cam0,cam1,...")
+      ->delimiter(',')
+      ->group(group);
   command.add_option("--first", first, "First frame, counted from 0")
       ->check(non_negative_number())
       ->capture_default_str()
@@ -24,9 +31,24 @@ void FrameSettings::add_to(CLI::App& command) {
       ->group(group);
 }
 
+fs::path FrameSettings::example(const std::string& dataset, int first_camera) const {
+  const std::vector<ws::SequenceFrame> frames =
+      folders.empty() ? ws::read_sequence(dataset, {first_camera})
+                      : ws::read_sequence({fs::path(dataset) / folders.front()});
+  return frames.front().images.front();
+}
+
 ChosenFrames FrameSettings::choose(const std::string& dataset,
                                    const std::vector<int>& cameras) const {
-  ChosenFrames frames{.all = ws::read_sequence(dataset, cameras, skip_incomplete), .chosen = {}};
+  if (!folders.empty() && folders.size() != cameras.size()) {
+    throw ws::Error("--folders names " + std::to_string(folders.size()) + " folders for " +
+                    std::to_string(cameras.size()) + " cameras; give one for each.");
+  }
+  std::vector<fs::path> of_cameras;
+  for (const std::string& folder : folders) of_cameras.push_back(fs::path(dataset) / folder);
+  ChosenFrames frames{.all = folders.empty() ? ws::read_sequence(dataset, cameras, skip_incomplete)
+                                             : ws::read_sequence(of_cameras, skip_incomplete),
+                      .chosen = {}};
   if (first >= static_cast<int>(frames.all.size())) {
     throw ws::Error(dataset + " has " + std::to_string(frames.all.size()) +
                     " frames; there is no frame " + std::to_string(first) +

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -19,13 +20,19 @@ struct FrameSettings {
       "Folder with cam0/, cam1/, ... (frames have equal file names), or in EuRoC or TUM VI layout "
       "(mav0/camN/data, data.csv)";
 
+  std::vector<std::string> folders;  ///< of the cameras' images in the data set; empty: cam0, ...
   int first = 0;
   int count = 0;  ///< 0 = all
   int step = 1;
   bool skip_incomplete = false;
 
-  /// Adds --first, --count, --step and --skip-incomplete.
+  /// Adds --folders, --first, --count, --step and --skip-incomplete.
   void add_to(CLI::App& command);
-  bool given() const { return first > 0 || count > 0 || step > 1 || skip_incomplete; }
+  bool given() const {
+    return !folders.empty() || first > 0 || count > 0 || step > 1 || skip_incomplete;
+  }
+  /// An image of the first of some cameras.
+  std::filesystem::path example(const std::string& dataset, int first_camera) const;
+  /// Of all frames of these cameras.
   ChosenFrames choose(const std::string& dataset, const std::vector<int>& cameras) const;
 };

@@ -109,11 +109,12 @@ PosedImages PosedImageSettings::of_trajectory() const {
                     "--poses.");
   }
   const int first = rig.views.empty() ? 0 : rig.views.front();
-  const ws::SequenceFrame example = ws::read_sequence(images, {first}).front();
-  const cv::Size of_image = ws::read_image(example.images.front()).size();
+  const cv::Size of_image = ws::read_image(frames.example(images, first)).size();
   std::vector<int> cameras = rig.views;
   if (cameras.empty()) {
-    cameras.resize(ws::read_calibration(rig.calibration, of_image).rig.views.size());
+    cameras.resize(frames.folders.empty()
+                       ? ws::read_calibration(rig.calibration, of_image).rig.views.size()
+                       : frames.folders.size());
     std::iota(cameras.begin(), cameras.end(), 0);
   }
   const ChosenFrames chosen = frames.choose(images, cameras);

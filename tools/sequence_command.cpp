@@ -78,7 +78,10 @@ std::vector<cv::Mat> reduced(std::vector<cv::Mat> images, const ws::SequenceFram
 
 Selection select_frames(const SequenceArguments& a) {
   std::vector<int> cameras = a.rig.views;
-  if (cameras.empty()) cameras = {0, 1};
+  if (cameras.empty()) {
+    cameras.resize(a.frames.folders.empty() ? 2 : a.frames.folders.size());
+    std::iota(cameras.begin(), cameras.end(), 0);
+  }
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);

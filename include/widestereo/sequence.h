@@ -32,6 +32,11 @@ std::vector<SequenceFrame> read_sequence(const std::filesystem::path& folder,
                                          const std::vector<int>& cameras,
                                          bool skip_incomplete = false);
 
+/// The same of cameras whose images are in these folders, at least one, each with images, or with
+/// data/ and, or instead of their names, data.csv.
+std::vector<SequenceFrame> read_sequence(const std::vector<std::filesystem::path>& camera_folders,
+                                         bool skip_incomplete = false);
+
 /// What poses are of: camera 0 of the calibration, whose frame is the rig's, or the IMU (the body).
 enum class Body { camera, imu };
 

@@ -113,18 +113,23 @@ fs::file_type type_of(const fs::path& path) {
 
 bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::directory; }
 
-/// Images of camN in either layout.
-Images images_of(const fs::path& folder, int camera) {
+/// Of one camera, listed or not.
+Images images_of(const fs::path& folder) {
+  const fs::path list = folder / "data.csv";
+  if (type_of(list) == fs::file_type::regular) return images_listed_in(list);
+  if (is_folder(folder / "data")) return images_in(folder / "data");
+  return images_in(folder);
+}
+
+/// Where the images of camN are in either layout.
+fs::path camera_folder(const fs::path& folder, int camera) {
   const std::string name = "cam" + std::to_string(camera);
   for (const fs::path& base : {folder / "mav0" / name, folder / name}) {
-    const fs::path list = base / "data.csv";
-    if (type_of(list) == fs::file_type::regular) return images_listed_in(list);
-    if (is_folder(base / "data")) return images_in(base / "data");
-    if (is_folder(base)) return images_in(base);
+    if (is_folder(base)) return base;
   }
   throw Error("There is no folder " + (folder / name).string() +
               "; a data set has images in cam0, cam1, ... or in mav0/cam0/data, mav0/cam1/data, "
-              "...");
+              "..., else name the folders of its cameras (--folders).");
 }
 
 /// Frames are told apart by name, which is also that of a folder.
@@ -181,13 +186,10 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
   return whole_number(nanoseconds);
 }
 
-std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
+std::vector<SequenceFrame> read_sequence(const std::vector<fs::path>& camera_folders,
                                          bool skip_incomplete) {
-  if (!is_folder(folder)) {
-    throw Error("There is no folder " + folder.string() + "; check the path.");
-  }
   std::vector<Images> images;
-  for (const int camera : cameras) images.push_back(images_of(folder, camera));
+  for (const fs::path& folder : camera_folders) images.push_back(images_of(folder));
   std::map<std::string, int, InOrder> counts;
   for (const Images& of_camera : images) {
     for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
@@ -198,27 +200,38 @@ std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vect
   for (const auto& [key, count] : counts) {
     SequenceFrame frame;
     frame.nanoseconds = have_times ? whole_number(key) : time_in_name(key);
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
+    for (std::size_t i = 0; i < images.size(); ++i) {
       const auto found = images[i].of_frames.find(key);
       if (found != images[i].of_frames.end()) {
         frame.images.push_back(found->second);
       } else if (!skip_incomplete) {
-        throw Error("The frame " + key + " has no image of cam" + std::to_string(cameras[i]) +
-                    " in " + folder.string() + " (" + std::to_string(images[i].of_frames.size()) +
-                    " of " + std::to_string(counts.size()) +
+        throw Error("The frame " + key + " has no image in " + camera_folders[i].string() + " (" +
+                    std::to_string(images[i].of_frames.size()) + " of " +
+                    std::to_string(counts.size()) +
                     " frames have one); add it, or leave such frames out (--skip-incomplete).");
       }
     }
-    if (frame.images.size() != cameras.size()) continue;
+    if (frame.images.size() != images.size()) continue;
     frame.name = frame.images.front().stem().string();
     frames.push_back(std::move(frame));
   }
   if (frames.empty()) {
-    throw Error("No frame of " + folder.string() +
-                " has images of all cameras; images of one frame must have equal names or times.");
+    throw Error("No frame has images of all cameras, beginning with those in " +
+                camera_folders.front().string() +
+                "; images of one frame must have equal names or times.");
   }
   require_usable_names(frames);
   return frames;
+}
+
+std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
+                                         bool skip_incomplete) {
+  if (!is_folder(folder)) {
+    throw Error("There is no folder " + folder.string() + "; check the path.");
+  }
+  std::vector<fs::path> camera_folders;
+  for (const int camera : cameras) camera_folders.push_back(camera_folder(folder, camera));
+  return read_sequence(camera_folders, skip_incomplete);
 }
 
 }  // namespace widestereo

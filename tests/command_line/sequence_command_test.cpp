@@ -110,6 +110,16 @@ TEST_F(SequenceCommand, ResumesWithTheSameBits) {
   EXPECT_TRUE(fs::exists(folder_ / "parts/001/result.json"));
 }
 
+TEST_F(SequenceCommand, ImagesMayBeInFoldersOfAnyName) {
+  ASSERT_EQ(run(sequence("standard")).exit_code, 0);
+  fs::create_directories(folder_ / "data/right");
+  fs::rename(folder_ / "data/cam0", folder_ / "data/left");
+  fs::rename(folder_ / "data/cam1", folder_ / "data/right/rgb");
+  const Outcome outcome = run(sequence("other") + "--folders left,right/rgb");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  expect_same_results("standard", "other");
+}
+
 TEST_F(SequenceCommand, ReplacedImagesAreMatchedAgain) {
   ASSERT_EQ(run(sequence()).exit_code, 0);
   const std::string first = bytes_of(folder_ / "out/000/result.json");
@@ -364,6 +374,9 @@ TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
   EXPECT_EQ(run(reconstruct + poses + " --views 0 --overwrite").exit_code, 0);
   EXPECT_EQ(record()["images"].size(), 3U);
   EXPECT_FALSE(fs::exists(folder_ / "out/000/cam1"));
+  fs::rename(folder_ / "data/cam0", folder_ / "data/left");
+  EXPECT_EQ(run(reconstruct + poses + " --folders left,cam1 --overwrite").exit_code, 0);
+  EXPECT_EQ(record()["images"].size(), 6U);
 }
 
 TEST_F(SequencePoses, NeedToBeOfWhatTheCalibrationKnows) {
@@ -387,10 +400,12 @@ TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {
     EXPECT_FALSE(fs::exists(folder_ / "out/000")) << arguments;
   };
   expect(sequence("out", "nowhere"), "nowhere");
-  fs::create_directories(folder_ / "empty/cam0");
+  for (const char* camera : {"empty/cam0", "empty/cam1"}) fs::create_directories(folder_ / camera);
   expect(sequence("out", "empty"), "no images");
   expect(sequence() + "--first 3", "3 frames");
   expect(sequence() + "--views 0,2", "cam2");
+  expect(sequence() + "--folders cam0,none", "none");
+  expect(sequence() + "--views 0,1 --folders cam0", "--folders names 1 folders for 2 cameras");
   expect(sequence() + "--poses " + file("none.txt"), "none.txt");
   folder_.write("few.txt", "1 0 0 0 0 0 0 1\n");
   expect(sequence() + "--poses " + file("few.txt"), "1 poses for 3 frames");
@@ -401,7 +416,7 @@ TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {
   folder_.write("data/cam1/000.png", "garbage");
   expect(sequence(), "cam1/000.png");
   fs::remove(folder_ / "data/cam1/000.png");
-  expect(sequence(), "frame 000 has no image of cam1");
+  expect(sequence(), "frame 000 has no image in " + file("data/cam1"));
 }
 
 TEST_F(SequenceCommand, ABrokenFrameLeavesTheFramesBeforeIt) {

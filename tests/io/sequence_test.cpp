@@ -68,6 +68,23 @@ TEST_F(Sequences, EurocFoldersWithoutListsAreMatchedByName) {
   EXPECT_EQ(frames[0].nanoseconds, 1403636579763555584);
 }
 
+TEST_F(Sequences, FoldersOfCamerasMayHaveAnyNames) {
+  add("left/images/7.png");
+  add("right/data/7.png");
+  add("image_03/data_rgb/7.png");
+  const auto frames =
+      read_sequence({folder_ / "image_03/data_rgb", folder_ / "left/images", folder_ / "right"});
+  ASSERT_EQ(names(frames), std::vector<std::string>{"7"});
+  EXPECT_EQ(frames[0].images,
+            (std::vector<fs::path>{folder_ / "image_03/data_rgb/7.png",
+                                   folder_ / "left/images/7.png", folder_ / "right/data/7.png"}));
+  EXPECT_THAT(error_of([&] {
+                read_sequence({folder_ / "left/images", folder_ / "up"});
+              }),
+              HasSubstr("up"));
+  EXPECT_THAT(error(), HasSubstr("--folders"));
+}
+
 TEST_F(Sequences, ListsAreInNanosecondsHoweverFewDigitsTheyHave) {
   add("mav0/cam0/data.csv", "50000000,a.png\n");
   const auto frames = read_sequence(folder_.path(), {0});
@@ -101,7 +118,7 @@ TEST_F(Sequences, WhatIsMissingIsNamed) {
   fs::create_directories(folder_ / "cam1");
   EXPECT_THAT(error(), HasSubstr("no images"));
   add("cam1/2.png");
-  EXPECT_THAT(error(), HasSubstr("frame 0 has no image of cam1"));
+  EXPECT_THAT(error(), HasSubstr("frame 0 has no image in " + (folder_ / "cam1").string()));
   EXPECT_THAT(error_of([&] {
                 read_sequence(folder_.path(), {0, 1}, true);
               }),
