@@ -46,6 +46,16 @@ const char* name_of(ws::CalibrationFormat format) {
       return "CamOdoCal";
     case ws::CalibrationFormat::vins:
       return "VINS-Fusion";
+    case ws::CalibrationFormat::ocam:
+      return "OCam";
+    case ws::CalibrationFormat::omnimvs:
+      return "OmniMVS";
+    case ws::CalibrationFormat::multicol:
+      return "MultiCol-SLAM";
+    case ws::CalibrationFormat::woodscape:
+      return "WoodScape";
+    case ws::CalibrationFormat::orb_slam:
+      return "ORB-SLAM3";
   }
   return "";
 }

@@ -9,21 +9,34 @@
 namespace widestereo {
 
 /// Calibration file formats, told apart by content, never by file name.
-enum class CalibrationFormat { kalibr, basalt, opencv, euroc, camodocal, vins };
+enum class CalibrationFormat {
+  kalibr,
+  basalt,
+  opencv,
+  euroc,
+  camodocal,
+  vins,
+  ocam,
+  omnimvs,
+  multicol,
+  woodscape,
+  orb_slam,
+};
 
 struct Calibration {
   Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu, T_imu_cam, T_BS,
-            ///< body_T_cam0
+            ///< body_T_cam0, IMU.T_b_c1
   CalibrationFormat format = CalibrationFormat::kalibr;
 };
 
 /// Reads a Kalibr camchain YAML, a Basalt JSON, an OpenCV FileStorage (YAML, XML or JSON; fisheye
 /// stereo or omnidir), EuRoC's sensor.yaml (one camera's, or the folder that has cam0/sensor.yaml,
-/// cam1/sensor.yaml, ... or has them in mav0), a camera of CamOdoCal or a VINS-Fusion configuration
-/// (with the cameras that it names), and validates it. Sizes come from the file; an OpenCV file
-/// without an image size takes `image_size` (pixels), and one of another size is refused. The other
-/// formats ignore `image_size`, as each of their cameras has a size of its own. Throws Error naming
-/// the file, the key and the remedy.
+/// cam1/sensor.yaml, ... or has them in mav0), a camera of CamOdoCal, OCamCalib or WoodScape, a
+/// configuration of VINS-Fusion or MultiCol-SLAM (with the cameras that it names), of OmniMVS or
+/// ORB-SLAM3, and validates it. Sizes come from the file; an OpenCV file without an image size
+/// takes `image_size` (pixels), and one of another size is refused. The other formats ignore
+/// `image_size`, as each of their cameras has a size of its own. Throws Error naming the file, the
+/// key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
 /// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg

@@ -99,11 +99,9 @@ Eigen::Isometry3d read_pose(const Document& document, const Json& entry) {
 }
 
 int side(const Document& document, const Json& value) {
-  const double number = value.is_number() ? value.get<double>() : 0;
-  if (number < 1 || number > 1e6 || number != std::floor(number)) {
-    document.fail("\"resolution\" must hold pairs of whole numbers of pixels.");
-  }
-  return static_cast<int>(number);
+  const std::optional<int> pixels = whole_number(value.is_number() ? value.get<double>() : 0);
+  if (!pixels) document.fail("\"resolution\" must hold pairs of whole numbers of pixels.");
+  return *pixels;
 }
 
 Json basalt_form(const View& view, const std::filesystem::path& path) {

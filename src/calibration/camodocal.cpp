@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/camodocal.h"
 
+#include <cctype>
 #include <initializer_list>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "calibration/ocam.h"
 #include "calibration/yaml_camera.h"
 
 namespace widestereo::calibration {
@@ -23,6 +26,20 @@ void read_numbers(const YamlCamera& part, Camera& camera, std::initializer_list<
   for (const auto& [key, member] : members) camera.*member = part.number(key);
 }
 
+/// Its first coordinate is the column.
+OCamLens read_ocam_lens(const YamlCamera& polynomial, const YamlCamera& affine) {
+  OCamLens lens;
+  const auto key = [&lens] {
+    return std::string("p").append(std::to_string(lens.polynomial.size()));
+  };
+  do {
+    lens.polynomial.push_back(polynomial.number(key().c_str()));
+  } while (polynomial.has(key().c_str()));
+  lens.matrix << affine.number("ac"), affine.number("ad"), affine.number("ae"), 1;
+  lens.centre = {affine.number("cx"), affine.number("cy")};
+  return lens;
+}
+
 View read_view(const Document& document, const std::string& name) {
   using C = Camera;
   View view;
@@ -30,7 +47,10 @@ View read_view(const Document& document, const std::string& name) {
   read_yaml(document, [&](const YAML::Node& root) {
     const YamlCamera keys(document, name, root);
     Camera& camera = view.camera;
-    const std::string model = keys.text("model_type");
+    std::string model = keys.text("model_type");
+    for (char& letter : model) letter = static_cast<char>(std::toupper(letter));
+    const int width = keys.side("image_width");
+    const int height = keys.side("image_height");
     const auto part = [&](const char* key) { return part_of(document, name, root, key); };
     constexpr const char* projection = "projection_parameters";
     constexpr const char* distortion = "distortion_parameters";
@@ -55,11 +75,15 @@ View read_view(const Document& document, const std::string& name) {
       camera.model = CameraModel::pinhole_radtan;
       read_numbers(part(projection), camera,
                    {{"fx", &C::fx}, {"fy", &C::fy}, {"cx", &C::cx}, {"cy", &C::cy}});
+    } else if (model == "SCARAMUZZA") {
+      camera = camera_of(read_ocam_lens(part("poly_parameters"), part("affine_parameters")), width,
+                         height, document, name);
     } else {
-      document.fail(name + ": The model_type \"" + model +
-                    "\" is not supported; use KANNALA_BRANDT, MEI, PINHOLE or PINHOLE_FULL.");
+      document.fail(
+          name + ": The model_type \"" + model +
+          "\" is not supported; use KANNALA_BRANDT, MEI, PINHOLE, PINHOLE_FULL or SCARAMUZZA.");
     }
-    if (model != "KANNALA_BRANDT") {
+    if (model != "KANNALA_BRANDT" && model != "SCARAMUZZA") {
       read_numbers(part(distortion), camera,
                    {{"k1", &C::k1}, {"k2", &C::k2}, {"p1", &C::p1}, {"p2", &C::p2}});
     }
@@ -69,8 +93,8 @@ View read_view(const Document& document, const std::string& name) {
                    {{"k3", &C::k3}, {"k4", &C::k4}, {"k5", &C::k5}, {"k6", &C::k6}});
       camera = simplified(camera);
     }
-    camera.width = keys.side("image_width");
-    camera.height = keys.side("image_height");
+    camera.width = width;
+    camera.height = height;
   });
   return view;
 }
@@ -104,7 +128,8 @@ Rig read_vins(const Document& document,
 
 bool is_camodocal(const Document& document) {
   return document.text.find("model_type") != std::string::npos &&
-         document.text.find("projection_parameters") != std::string::npos;
+         (document.text.find("projection_parameters") != std::string::npos ||
+          document.text.find("poly_parameters") != std::string::npos);
 }
 
 Rig read_camodocal(const Document& document) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "widestereo/calibration.h"
@@ -25,6 +26,9 @@ void add_view_of_body(Rig& rig, View view, const Eigen::Isometry3d& body_from_ca
 Rig read_kalibr(const Document& document);
 Rig read_basalt(const Document& document);
 Rig read_opencv(const Document& document, cv::Size image_size);
+
+/// A count that a file states, as of pixels; none where it is no whole number from 1 to a million.
+std::optional<int> whole_number(double value);
 
 /// xi form of the unified model from the alpha form: xi = alpha / (1 - alpha), f_xi = f_alpha (1 +
 /// xi).

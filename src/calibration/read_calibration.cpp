@@ -2,6 +2,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <fstream>
 #include <sstream>
 #include <string_view>
@@ -12,6 +13,10 @@
 #include "calibration/colmap_files.h"
 #include "calibration/euroc.h"
 #include "calibration/formats.h"
+#include "calibration/multicol.h"
+#include "calibration/ocam.h"
+#include "calibration/orb_slam.h"
+#include "calibration/woodscape.h"
 #include "geometry/validation.h"
 #include "widestereo/error.h"
 #include "widestereo/sfm_model.h"
@@ -49,6 +54,11 @@ Camera simplified(Camera camera) {
       break;
   }
   return camera;
+}
+
+std::optional<int> whole_number(double value) {
+  if (!(value >= 1 && value <= 1e6) || value != std::floor(value)) return std::nullopt;
+  return static_cast<int>(value);
 }
 
 Eigen::Isometry3d rigid(const Document& document, const std::string& what,
@@ -167,25 +177,14 @@ bool contains(const Document& document, const char* text) {
   return document.text.find(text) != std::string::npos;
 }
 
-/// Formats of polynomial lens models, each told by a word of its own.
-void refuse_polynomials(const Document& document) {
-  constexpr std::pair<const char*, const char*> words[] = {{"ocam_model", "an OCam"},
-                                                           {"Camera.nrpol", "an OCam"},
-                                                           {"unprojection:", "an OCam"},
-                                                           {"poly_parameters", "an OCam"},
-                                                           {"\"radial_poly\"", "a WoodScape"}};
-  for (const auto& [word, owner] : words) {
-    if (!contains(document, word)) continue;
-    document.fail(std::string("It is ") + owner +
-                  " calibration, whose polynomial model is not supported; calibrate the lens with "
-                  "Kalibr, Basalt or OpenCV.");
-  }
-}
-
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
-  refuse_polynomials(document);
+  if (is_ocam(document)) return CalibrationFormat::ocam;
+  if (is_multicol(document)) return CalibrationFormat::multicol;
+  if (is_omnimvs(document)) return CalibrationFormat::omnimvs;
+  if (is_woodscape(document)) return CalibrationFormat::woodscape;
+  if (is_orb_slam(document)) return CalibrationFormat::orb_slam;
   if (is_vins(document)) return CalibrationFormat::vins;
   // Configurations of VINS-Mono are a camera of CamOdoCal with more keys, some of them matrices.
   if (is_camodocal(document)) return CalibrationFormat::camodocal;
@@ -198,15 +197,14 @@ CalibrationFormat format_of(const Document& document) {
   if (contains(document, "camera_model")) return CalibrationFormat::kalibr;
   document.fail(
       "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
-      "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a CamOdoCal camera or a VINS-Fusion "
-      "configuration.");
+      "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a camera of CamOdoCal, OCamCalib or "
+      "WoodScape, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS or MultiCol-SLAM.");
 }
 
 /// A file that another one names.
 Document load_camera(const std::filesystem::path& path) {
   Document document = load(path);
   require_shallow(document);
-  refuse_polynomials(document);
   return document;
 }
 
@@ -240,6 +238,21 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       break;
     case CalibrationFormat::vins:
       result.rig = read_vins(documents[0], load_camera);
+      break;
+    case CalibrationFormat::ocam:
+      result.rig = read_ocam(documents[0]);
+      break;
+    case CalibrationFormat::omnimvs:
+      result.rig = read_omnimvs(documents[0]);
+      break;
+    case CalibrationFormat::multicol:
+      result.rig = read_multicol(documents[0], load_camera);
+      break;
+    case CalibrationFormat::woodscape:
+      result.rig = read_woodscape(documents[0]);
+      break;
+    case CalibrationFormat::orb_slam:
+      result.rig = read_orb_slam(documents[0]);
       break;
   }
   validate(result.rig, path.string());

@@ -2,10 +2,10 @@
 #include "calibration/yaml_camera.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <optional>
 #include <set>
+#include <sstream>
 
 #include "text/number.h"
 
@@ -14,11 +14,21 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-/// yaml-cpp refuses OpenCV's header line, which OpenVINS files begin with.
-std::string without_directive(std::string text) {
-  const std::size_t at = text.find("%YAML:1.0");
-  if (at != std::string::npos && text.find_first_not_of(" \t\r\n") == at) text.erase(0, at + 9);
-  return text;
+/// What OpenCV's own YAML, told by its header line, may have that yaml-cpp refuses: that line (in
+/// OpenVINS's files) and keys without a space before their value (in ORB-SLAM's).
+std::string as_yaml(const std::string& text) {
+  const std::string header = "%YAML:1.0";
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin == std::string::npos || text.compare(begin, header.size(), header) != 0) return text;
+  std::istringstream lines(text.substr(begin + header.size()));
+  std::string result;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t key = line.find_first_not_of(' ');
+    const std::size_t colon = line.find_first_of(":#\"'[{, ", key);
+    if (colon != std::string::npos && line[colon] == ':') line.insert(colon + 1, 1, ' ');
+    result.append(line).push_back('\n');
+  }
+  return result;
 }
 
 /// The parser keeps all of equal keys, of which a look-up finds one.
@@ -36,11 +46,9 @@ void require_single_keys(const Document& document, const YAML::Node& map,
 
 void read_yaml(const Document& document, const std::function<void(const YAML::Node& root)>& read) {
   try {
-    const YAML::Node root = YAML::Load(without_directive(document.text));
+    const YAML::Node root = YAML::Load(as_yaml(document.text));
     if (!root.IsMap()) {
-      document.fail(
-          "It holds no keys such as cam0 or camera_model; give a Kalibr camchain, EuRoC's "
-          "sensor.yaml, a CamOdoCal camera or a VINS-Fusion configuration.");
+      document.fail("It holds no keys such as cam0 or camera_model; is it a calibration?");
     }
     require_single_keys(document, root, "");
     read(root);
@@ -70,14 +78,27 @@ double YamlCamera::number(const char* key) const {
   return number(node_[key], key);
 }
 
-int YamlCamera::side(double value, const char* key) const {
-  if (value < 1 || value > 1e6 || value != std::floor(value)) {
-    fail(std::string("The key ") + key + " must hold whole numbers of pixels.");
+int YamlCamera::count(const char* key) const {
+  constexpr int most = 100;
+  const std::optional<int> value = whole_number(number(key));
+  if (!value || *value > most) {
+    fail(std::string("The key ") + key + " must be a whole number from 1 to 100.");
   }
-  return static_cast<int>(value);
+  return *value;
+}
+
+int YamlCamera::side(double value, const char* key) const {
+  const std::optional<int> pixels = whole_number(value);
+  if (!pixels) fail(std::string("The key ") + key + " must hold whole numbers of pixels.");
+  return *pixels;
 }
 
 int YamlCamera::side(const char* key) const { return side(number(key), key); }
+
+std::vector<int> YamlCamera::sides(const char* key) const {
+  const std::vector<double> values = numbers(key, 2);
+  return {side(values[0], key), side(values[1], key)};
+}
 
 double YamlCamera::number(const YAML::Node& node, const char* key) const {
   // yaml-cpp would read and write numbers by the locale.
@@ -93,6 +114,12 @@ std::vector<double> YamlCamera::numbers(const YAML::Node& list, const char* key)
   std::vector<double> values;
   for (const YAML::Node& value : list) values.push_back(number(value, key));
   return values;
+}
+
+std::vector<double> YamlCamera::numbers(const char* key) const {
+  const YAML::Node list = node_[key];
+  if (!list || !list.IsSequence()) fail(std::string("The key ") + key + " must list numbers.");
+  return numbers(list, key);
 }
 
 std::vector<double> YamlCamera::numbers(const char* key, std::size_t count) const {
@@ -223,9 +250,9 @@ void YamlCamera::set_distortion(Camera& camera) const {
 }
 
 void YamlCamera::set_resolution(Camera& camera) const {
-  const std::vector<double> resolution = numbers("resolution", 2);
-  camera.width = side(resolution[0], "resolution");
-  camera.height = side(resolution[1], "resolution");
+  const std::vector<int> resolution = sides("resolution");
+  camera.width = resolution[0];
+  camera.height = resolution[1];
 }
 
 }  // namespace widestereo::calibration

@@ -29,16 +29,21 @@ class YamlCamera {
   /// Throws Error where the key is missing, unless there is something to take instead.
   std::string text(const char* key, const char* otherwise = nullptr) const;
   double number(const char* key) const;
+  /// A whole number, at most 100.
+  int count(const char* key) const;
   /// Pixels of an image's side.
   int side(const char* key) const;
+  /// Of both sides, in the file's order.
+  std::vector<int> sides(const char* key) const;
+  std::vector<double> numbers(const char* key) const;
+  /// Surplus numbers may only be zeros: what another one means would be lost.
+  std::vector<double> numbers(const char* key, std::size_t count) const;
   Eigen::Isometry3d motion(const char* key) const;
 
  private:
   [[noreturn]] void fail(const std::string& what) const;
   int side(double value, const char* key) const;
   std::vector<double> numbers(const YAML::Node& list, const char* key) const;
-  /// Surplus numbers may only be zeros: what another one means would be lost.
-  std::vector<double> numbers(const char* key, std::size_t count) const;
   double number(const YAML::Node& node, const char* key) const;
   void set_projection(Camera& camera) const;
   void set_distortion(Camera& camera) const;

@@ -50,6 +50,11 @@ const std::string pinhole = with_lens("PINHOLE",
                                       "projection_parameters:\n"
                                       "   fx: 458.5\n   fy: 457.25\n   cx: 367\n   cy: 248\n");
 
+const std::string ocam_lens =
+    "poly_parameters:\n   p0: -400\n   p1: 0\n   p2: 1e-03\n   p3: 0\n   p4: 2e-09\n"
+    "inv_poly_parameters:\n   p0: 600\n   p1: 400\n"
+    "affine_parameters:\n   ac: 0.999\n   ad: 0.01\n   ae: -0.02\n   cx: 716.5\n   cy: 705.75\n";
+
 /// The camera of a file with this text.
 Camera camera_of(const std::string& text) {
   const TemporaryFolder folder;
@@ -64,10 +69,10 @@ Camera camera_of(const std::string& text) {
 }
 
 void expect_projection(const Camera& camera, const Eigen::Vector3d& point,
-                       const Eigen::Vector2d& expected) {
+                       const Eigen::Vector2d& expected, double tolerance = 1e-9) {
   Eigen::Vector2d pixel;
   ASSERT_TRUE(project(camera, point, pixel)) << point.transpose();
-  EXPECT_LT((pixel - expected).norm(), 1e-9)
+  EXPECT_LT((pixel - expected).norm(), tolerance)
       << pixel.transpose() << ", not " << expected.transpose();
 }
 
@@ -114,6 +119,18 @@ TEST(CamOdoCal, ReadsPinholes) {
   expect_projection(full, {x, y, 1},
                     {700 * (x * radial + 2e-4 * x * y + 2e-4 * (q + 2 * x * x)) + 699,
                      701 * (y * radial + 1e-4 * (q + 2 * y * y) + 4e-4 * x * y) + 689});
+}
+
+TEST(CamOdoCal, ReadsOCamsLenses) {
+  const Camera camera = camera_of(with_lens("scaramuzza", ocam_lens));
+  EXPECT_EQ(camera.model, CameraModel::polynomial_fisheye);
+  // Its matrix is of the column and the row; p0's sign tells on which side z lies.
+  for (const double radius : {1.0, 100.0, 350.0, 600.0}) {
+    const Eigen::Vector2d p(0.6 * radius, -0.8 * radius);
+    const double z = 400 - 1e-3 * radius * radius - 2e-9 * std::pow(radius, 4);
+    expect_projection(camera, {p.x(), p.y(), z},
+                      {0.999 * p.x() + 0.01 * p.y() + 716.5, -0.02 * p.x() + p.y() + 705.75}, 0.06);
+  }
 }
 
 TEST(CamOdoCal, MayBePartOfAConfiguration) {
@@ -197,8 +214,8 @@ TEST_F(Vins, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(camera(replaced(mei, "MEI", "FOV")), HasSubstr("model_type \"FOV\""));
   EXPECT_THAT(camera(replaced(mei, "1400", "1400.5")), HasSubstr("image_width"));
   EXPECT_THAT(camera(replaced(mei, "1336.25", "nan")), HasSubstr("gamma1"));
-  EXPECT_THAT(camera(with_lens("SCARAMUZZA", "poly_parameters:\n   p0: -290\n")),
-              HasSubstr("OCam"));
+  EXPECT_THAT(camera(with_lens("SCARAMUZZA", replaced(ocam_lens, "ae:", "a:"))),
+              HasSubstr("affine_parameters: The key ae is missing"));
   EXPECT_THAT(camera(""), HasSubstr("cam1.yaml"));
   EXPECT_GT(test::times_refused(kannala_brandt, camera), 100);
 }
