@@ -154,7 +154,7 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     x = distorted.x;
     y = distorted.y;
   }
-  // Skew and shear last: where x and y share a factor, Mesa would make one product of two, with other bits.
+  // Skew and shear last: of two products and a term Mesa adds the second product last, however it is written.
   pixel = real2((camera.intrinsics.x * x + camera.intrinsics.z) + camera.domain.z * y,
                 camera.intrinsics.y * y + camera.intrinsics.w);
   if (model == CAMERA_POLYNOMIAL_FISHEYE) pixel.y = pixel.y + camera.domain.w * x;
