@@ -56,6 +56,8 @@ const char* name_of(ws::CalibrationFormat format) {
       return "WoodScape";
     case ws::CalibrationFormat::orb_slam:
       return "ORB-SLAM3";
+    case ws::CalibrationFormat::depthai:
+      return "DepthAI";
   }
   return "";
 }

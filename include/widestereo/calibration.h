@@ -21,6 +21,7 @@ enum class CalibrationFormat {
   multicol,
   woodscape,
   orb_slam,
+  depthai,
 };
 
 struct Calibration {
@@ -33,10 +34,10 @@ struct Calibration {
 /// stereo or omnidir), EuRoC's sensor.yaml (one camera's, or the folder that has cam0/sensor.yaml,
 /// cam1/sensor.yaml, ... or has them in mav0), a camera of CamOdoCal, OCamCalib or WoodScape, a
 /// configuration of VINS-Fusion or MultiCol-SLAM (with the cameras that it names), of OmniMVS or
-/// ORB-SLAM3, and validates it. Sizes come from the file; an OpenCV file without an image size
-/// takes `image_size` (pixels), and one of another size is refused. The other formats ignore
-/// `image_size`, as each of their cameras has a size of its own. Throws Error naming the file, the
-/// key and the remedy.
+/// ORB-SLAM3, a calibration of DepthAI, and validates it. Sizes come from the file; an OpenCV file
+/// without an image size takes `image_size` (pixels), and one of another size is refused. The other
+/// formats ignore `image_size`, as each of their cameras has a size of its own. Throws Error naming
+/// the file, the key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
 /// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg

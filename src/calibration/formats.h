@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "widestereo/calibration.h"
@@ -35,6 +36,15 @@ std::optional<int> whole_number(double value);
 void set_unified_from_alpha(Camera& camera, double alpha);
 /// alpha = xi / (1 + xi); the focal length of the alpha form is f_xi / (1 + xi).
 double unified_alpha(const Camera& camera);
+
+/// cv::fisheye's model and its four coefficients.
+Camera fisheye_camera(std::span<const double> coefficients);
+/// A pinhole with coefficients in cv::stereoCalibrate()'s order, in as simple a model as they
+/// allow. Fails where those of a tilted sensor are not 0; `what` has them.
+Camera rational_camera(const Document& document, const std::string& what,
+                       std::span<const double> coefficients);
+/// Focal lengths, skew and centre of a camera matrix.
+void set_matrix(Camera& camera, const Eigen::Matrix3d& k);
 
 /// The same camera in the model with the fewest coefficients: without those that are 0.
 Camera simplified(Camera camera);

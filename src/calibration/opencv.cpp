@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
 #include <iterator>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/core/persistence.hpp>
+#include <span>
 
 #include "calibration/formats.h"
 
@@ -66,8 +66,6 @@ class Storage {
     return {};
   }
 
-  [[noreturn]] void fail(const std::string& what) const { document_.fail(what); }
-
  private:
   /// A damaged header must not make OpenCV allocate gigabytes.
   void require_small(const cv::FileNode& node, const char* key) const {
@@ -101,54 +99,46 @@ struct CameraKeys {
 constexpr int kannala_brandt_coefficients = 4;
 
 /// If coefficients that the model lacks were dropped, rays would be wrong without a word.
-void require_zero(const Storage& storage, const CameraKeys& keys, const cv::Mat& excess,
+void require_zero(const Document& document, const std::string& what, std::span<const double> excess,
                   const std::string& remedy) {
-  if (cv::countNonZero(excess) == 0) return;
-  storage.fail(std::string(keys.name) + ": The distortion (" + *keys.d.begin() +
-               ") has non-zero coefficients that are not supported; " + remedy);
+  if (std::ranges::all_of(excess, [](double value) { return value == 0; })) return;
+  document.fail(what + " has non-zero coefficients that are not supported; " + remedy);
 }
 
-Camera read_camera(const Storage& storage, const CameraKeys& keys, cv::Size size) {
-  const cv::Mat k =
-      storage.required(keys.k, 9, "camera matrix").reshape(1, 1).colRange(0, 9).reshape(1, 3);
-  const cv::Mat d = storage.required(keys.d, kannala_brandt_coefficients, "distortion");
+/// A camera's model and its coefficients.
+Camera read_lens(const Document& document, const Storage& storage, const CameraKeys& keys) {
+  const std::string what = std::string(keys.name) + ": The distortion (" + *keys.d.begin() + ")";
+  const cv::Mat_<double> row =
+      storage.required(keys.d, kannala_brandt_coefficients, "distortion").reshape(1, 1);
+  const std::vector<double> c(row.begin(), row.end());
   const cv::Mat xi = storage.matrix(keys.xi);
   Camera camera;
-  camera.width = size.width;
-  camera.height = size.height;
-  camera.fx = k.at<double>(0, 0);
-  camera.skew = k.at<double>(0, 1);
-  camera.cx = k.at<double>(0, 2);
-  camera.fy = k.at<double>(1, 1);
-  camera.cy = k.at<double>(1, 2);
-  const cv::Mat_<double> c = d.reshape(1, 1);
   if (!xi.empty()) {
-    require_zero(storage, keys, c.colRange(4, c.cols),
+    require_zero(document, what, std::span(c).subspan(4),
                  "cv::omnidir has four, k1 k2 p1 p2: calibrate with it.");
     camera.model = CameraModel::mei;
     camera.xi = xi.at<double>(0);
-    camera.k1 = c(0);
-    camera.k2 = c(1);
-    camera.p1 = c(2);
-    camera.p2 = c(3);
-  } else if (c.cols == kannala_brandt_coefficients) {
-    // cv::fisheye: four radial coefficients. Files of cv::stereoCalibrate have five or more.
-    camera.model = CameraModel::kannala_brandt;
-    camera.k1 = c(0);
-    camera.k2 = c(1);
-    camera.k3 = c(2);
-    camera.k4 = c(3);
-  } else {
-    // In cv::stereoCalibrate()'s order; a sensor's tilt may follow.
-    using C = Camera;
-    constexpr double C::*members[] = {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, &C::k4,
-                                      &C::k5, &C::k6, &C::s1, &C::s2, &C::s3, &C::s4};
-    const int used = std::min(c.cols, static_cast<int>(std::size(members)));
-    require_zero(storage, keys, c.colRange(used, c.cols), "calibrate without CALIB_TILTED_MODEL.");
-    camera.model = CameraModel::pinhole_rational;
-    for (int i = 0; i < used; ++i) camera.*members[i] = c(i);
-    return simplified(camera);
+    camera.k1 = c[0];
+    camera.k2 = c[1];
+    camera.p1 = c[2];
+    camera.p2 = c[3];
+    return camera;
   }
+  // Files of cv::stereoCalibrate have five or more.
+  if (c.size() == kannala_brandt_coefficients) return fisheye_camera(c);
+  return rational_camera(document, what, c);
+}
+
+Camera read_camera(const Document& document, const Storage& storage, const CameraKeys& keys,
+                   cv::Size size) {
+  const cv::Mat k =
+      storage.required(keys.k, 9, "camera matrix").reshape(1, 1).colRange(0, 9).reshape(1, 3);
+  Camera camera = read_lens(document, storage, keys);
+  camera.width = size.width;
+  camera.height = size.height;
+  Eigen::Matrix3d matrix;
+  cv::cv2eigen(k, matrix);
+  set_matrix(camera, matrix);
   return camera;
 }
 
@@ -169,6 +159,38 @@ Eigen::Isometry3d second_from_first(const Storage& storage, const Document& docu
 
 }  // namespace
 
+Camera fisheye_camera(std::span<const double> coefficients) {
+  Camera camera;
+  camera.model = CameraModel::kannala_brandt;
+  camera.k1 = coefficients[0];
+  camera.k2 = coefficients[1];
+  camera.k3 = coefficients[2];
+  camera.k4 = coefficients[3];
+  return camera;
+}
+
+Camera rational_camera(const Document& document, const std::string& what,
+                       std::span<const double> coefficients) {
+  using C = Camera;
+  // A sensor's tilt may follow.
+  constexpr double C::*members[] = {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, &C::k4,
+                                    &C::k5, &C::k6, &C::s1, &C::s2, &C::s3, &C::s4};
+  const std::size_t used = std::min(coefficients.size(), std::size(members));
+  require_zero(document, what, coefficients.subspan(used), "calibrate without CALIB_TILTED_MODEL.");
+  Camera camera;
+  camera.model = CameraModel::pinhole_rational;
+  for (std::size_t i = 0; i < used; ++i) camera.*members[i] = coefficients[i];
+  return simplified(camera);
+}
+
+void set_matrix(Camera& camera, const Eigen::Matrix3d& k) {
+  camera.fx = k(0, 0);
+  camera.skew = k(0, 1);
+  camera.cx = k(0, 2);
+  camera.fy = k(1, 1);
+  camera.cy = k(1, 2);
+}
+
 Rig read_opencv(const Document& document, cv::Size image_size) {
   try {
     const Storage storage(document);
@@ -188,7 +210,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     rig.views.resize(2);
     rig.views[0].name = "cam0";
     rig.views[1].name = "cam1";
-    rig.views[0].camera = read_camera(storage,
+    rig.views[0].camera = read_camera(document, storage,
                                       {"cam0",
                                        {"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
                                         "camera_matrix_left", "K", "camera_matrix"},
@@ -205,7 +227,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
       return rig;
     }
     rig.views[1].camera = read_camera(
-        storage,
+        document, storage,
         {"cam1",
          {"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
          {"D2", "distCoeffs2", "dist_coeffs_2", "D_right", "distortion_right"},

@@ -11,6 +11,7 @@
 
 #include "calibration/camodocal.h"
 #include "calibration/colmap_files.h"
+#include "calibration/depthai.h"
 #include "calibration/euroc.h"
 #include "calibration/formats.h"
 #include "calibration/multicol.h"
@@ -185,6 +186,7 @@ CalibrationFormat format_of(const Document& document) {
   if (is_omnimvs(document)) return CalibrationFormat::omnimvs;
   if (is_woodscape(document)) return CalibrationFormat::woodscape;
   if (is_orb_slam(document)) return CalibrationFormat::orb_slam;
+  if (is_depthai(document)) return CalibrationFormat::depthai;
   if (is_vins(document)) return CalibrationFormat::vins;
   // Configurations of VINS-Mono are a camera of CamOdoCal with more keys, some of them matrices.
   if (is_camodocal(document)) return CalibrationFormat::camodocal;
@@ -198,7 +200,7 @@ CalibrationFormat format_of(const Document& document) {
   document.fail(
       "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
       "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a camera of CamOdoCal, OCamCalib or "
-      "WoodScape, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS or MultiCol-SLAM.");
+      "WoodScape, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI.");
 }
 
 /// A file that another one names.
@@ -253,6 +255,9 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       break;
     case CalibrationFormat::orb_slam:
       result.rig = read_orb_slam(documents[0]);
+      break;
+    case CalibrationFormat::depthai:
+      result.rig = read_depthai(documents[0]);
       break;
   }
   validate(result.rig, path.string());

@@ -139,19 +139,35 @@ std::vector<double> YamlCamera::numbers(const char* key, std::size_t count) cons
   return values;
 }
 
+std::vector<double> YamlCamera::rows(const YAML::Node& list, std::size_t columns, const char* key,
+                                     const std::string& shape) const {
+  std::vector<double> values;
+  for (const YAML::Node& row : list) {
+    if (!row.IsSequence() || row.size() != columns) {
+      fail(std::string("The key ") + key + " must be " + shape + ".");
+    }
+    const std::vector<double> of_row = numbers(row, key);
+    values.insert(values.end(), of_row.begin(), of_row.end());
+  }
+  return values;
+}
+
+Eigen::Matrix3d YamlCamera::matrix(const char* key) const {
+  const YAML::Node node = node_[key];
+  if (!node || !node.IsSequence() || node.size() != 3) {
+    fail(std::string("The key ") + key + " (3x3 matrix, three rows) is missing.");
+  }
+  const std::vector<double> values = rows(node, 3, key, "a 3x3 matrix");
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
+}
+
 Eigen::Isometry3d YamlCamera::motion(const char* key) const {
   const YAML::Node node = node_[key];
   std::vector<double> values;
   if (node && node.IsMap() && node["data"] && node["data"].IsSequence()) {
     values = numbers(node["data"], key);
   } else if (node && node.IsSequence() && node.size() >= 3) {
-    for (const YAML::Node& row : node) {
-      if (!row.IsSequence() || row.size() != 4) {
-        fail(std::string("The key ") + key + " must be a 4x4 matrix.");
-      }
-      const std::vector<double> of_row = numbers(row, key);
-      values.insert(values.end(), of_row.begin(), of_row.end());
-    }
+    values = rows(node, 4, key, "a 4x4 matrix");
   } else {
     fail(std::string("The key ") + key + " (4x4 matrix, four rows) is missing.");
   }

@@ -39,11 +39,16 @@ class YamlCamera {
   /// Surplus numbers may only be zeros: what another one means would be lost.
   std::vector<double> numbers(const char* key, std::size_t count) const;
   Eigen::Isometry3d motion(const char* key) const;
+  /// Three rows of three numbers.
+  Eigen::Matrix3d matrix(const char* key) const;
 
  private:
   [[noreturn]] void fail(const std::string& what) const;
   int side(double value, const char* key) const;
   std::vector<double> numbers(const YAML::Node& list, const char* key) const;
+  /// The numbers of rows of `columns` each, one row after the other.
+  std::vector<double> rows(const YAML::Node& list, std::size_t columns, const char* key,
+                           const std::string& shape) const;
   double number(const YAML::Node& node, const char* key) const;
   void set_projection(Camera& camera) const;
   void set_distortion(Camera& camera) const;

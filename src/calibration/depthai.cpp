@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#include "calibration/depthai.h"
+
+#include <Eigen/Dense>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calibration/yaml_camera.h"
+
+namespace widestereo::calibration {
+namespace {
+
+/// Where something is, relative to a camera.
+struct Link {
+  int socket = -1;  ///< of that camera; negative: nowhere
+  Eigen::Isometry3d from_this = Eigen::Isometry3d::Identity();
+};
+
+struct SocketCamera {
+  View view;
+  Link link;
+  std::optional<Eigen::Isometry3d> first_from_camera;
+};
+
+constexpr const char* cameras_key = "cameraData";
+constexpr const char* link_key = "toCameraSocket";
+constexpr double metres_of_a_centimetre = 0.01;
+
+/// CAM_A is 0; negative: none.
+int socket_of(double number) {
+  constexpr int sockets = 26;
+  return number >= 0 && number < sockets ? static_cast<int>(number) : -1;
+}
+
+Link read_link(const Document& document, const std::string& name, const YAML::Node& node) {
+  const YamlCamera keys(document, name, node);
+  Link link;
+  link.socket = socket_of(keys.number(link_key));
+  if (link.socket < 0) return link;
+  const YamlCamera centimetres(document, name + ": translation", node["translation"]);
+  const Eigen::Vector3d translation(centimetres.number("x"), centimetres.number("y"),
+                                    centimetres.number("z"));
+  link.from_this = rigid(document, name + ": rotationMatrix", keys.matrix("rotationMatrix"),
+                         metres_of_a_centimetre * translation);
+  return link;
+}
+
+Camera read_camera(const Document& document, const std::string& name, const YamlCamera& keys) {
+  constexpr int perspective = 0, fisheye = 1;
+  const double type = keys.number("cameraType");
+  const std::vector<double> coefficients = keys.numbers("distortionCoeff");
+  Camera camera;
+  if (type == perspective) {
+    camera = rational_camera(document, name + ": The distortionCoeff", coefficients);
+  } else if (type == fisheye && coefficients.size() >= 4) {
+    camera = fisheye_camera(coefficients);
+  } else {
+    document.fail(name +
+                  ": The cameraType is none of 0 (perspective) and 1 (fisheye), with the "
+                  "coefficients of one.");
+  }
+  set_matrix(camera, keys.matrix("intrinsicMatrix"));
+  camera.width = keys.side("width");
+  camera.height = keys.side("height");
+  return camera;
+}
+
+/// Follows the links from the first camera in both directions.
+void find_poses(std::map<int, SocketCamera>& cameras) {
+  cameras.begin()->second.first_from_camera = Eigen::Isometry3d::Identity();
+  for (bool found = true; found;) {
+    found = false;
+    for (auto& [socket, camera] : cameras) {
+      const auto other = cameras.find(camera.link.socket);
+      if (other == cameras.end()) continue;
+      auto& here = camera.first_from_camera;
+      auto& there = other->second.first_from_camera;
+      if (here.has_value() == there.has_value()) continue;
+      found = true;
+      if (there) {
+        here = *there * camera.link.from_this;
+      } else {
+        there = *here * camera.link.from_this.inverse();
+      }
+    }
+  }
+}
+
+}  // namespace
+
+bool is_depthai(const Document& document) {
+  return document.text.find(cameras_key) != std::string::npos &&
+         document.text.find(link_key) != std::string::npos;
+}
+
+Rig read_depthai(const Document& document) {
+  Rig rig;
+  // JSON is YAML, too.
+  read_yaml(document, [&](const YAML::Node& root) {
+    const YAML::Node list = root[cameras_key];
+    if (!list || !list.IsSequence()) document.fail("The list cameraData is missing.");
+    std::map<int, SocketCamera> cameras;
+    for (const YAML::Node& entry : list) {
+      const bool is_pair = entry.IsSequence() && entry.size() == 2;
+      const int socket = is_pair ? socket_of(entry[0].as<double>(-1)) : -1;
+      if (socket < 0) {
+        document.fail("The list cameraData does not hold pairs of a socket and its camera.");
+      }
+      SocketCamera camera;
+      camera.view.name = "CAM_";
+      camera.view.name.push_back(static_cast<char>('A' + socket));
+      const YamlCamera keys(document, camera.view.name, entry[1]);
+      // Sockets without a calibrated camera are there, too.
+      if (keys.number("width") == 0) continue;
+      camera.view.camera = read_camera(document, camera.view.name, keys);
+      camera.link = read_link(document, camera.view.name + ": extrinsics", entry[1]["extrinsics"]);
+      if (!cameras.emplace(socket, std::move(camera)).second) {
+        document.fail("The list cameraData has a socket twice.");
+      }
+    }
+    if (cameras.empty()) document.fail("The list cameraData has no calibrated camera.");
+    find_poses(cameras);
+    for (auto& [socket, camera] : cameras) {
+      if (!camera.first_from_camera) {
+        document.fail(camera.view.name + ": No toCameraSocket links it to " +
+                      cameras.begin()->second.view.name + "; calibrate the cameras together.");
+      }
+      camera.view.world_from_camera = *camera.first_from_camera;
+      rig.views.push_back(camera.view);
+    }
+    if (const YAML::Node imu = root["imuExtrinsics"]) {
+      const Link link = read_link(document, "imuExtrinsics", imu);
+      if (const auto camera = cameras.find(link.socket); camera != cameras.end()) {
+        rig.world_from_imu = *camera->second.first_from_camera * link.from_this;
+      }
+    }
+  });
+  return rig;
+}
+
+}  // namespace widestereo::calibration
