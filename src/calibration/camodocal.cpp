@@ -101,9 +101,7 @@ View read_view(const Document& document, const std::string& name) {
 
 }  // namespace
 
-bool is_vins(const Document& document) {
-  return document.text.find("cam0_calib") != std::string::npos;
-}
+bool is_vins(const Document& document) { return document.contains("cam0_calib"); }
 
 Rig read_vins(const Document& document,
               const std::function<Document(const std::filesystem::path&)>& load) {
@@ -127,9 +125,8 @@ Rig read_vins(const Document& document,
 }
 
 bool is_camodocal(const Document& document) {
-  return document.text.find("model_type") != std::string::npos &&
-         (document.text.find("projection_parameters") != std::string::npos ||
-          document.text.find("poly_parameters") != std::string::npos);
+  return document.contains("model_type") &&
+         (document.contains("projection_parameters") || document.contains("poly_parameters"));
 }
 
 Rig read_camodocal(const Document& document) {

@@ -92,8 +92,7 @@ void find_poses(std::map<int, SocketCamera>& cameras) {
 }  // namespace
 
 bool is_depthai(const Document& document) {
-  return document.text.find(cameras_key) != std::string::npos &&
-         document.text.find(link_key) != std::string::npos;
+  return document.contains(cameras_key) && document.contains(link_key);
 }
 
 Rig read_depthai(const Document& document) {

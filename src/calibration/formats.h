@@ -16,6 +16,8 @@ struct Document {
   std::filesystem::path path;
   std::string text;
 
+  bool contains(const char* words) const { return text.find(words) != std::string::npos; }
+
   /// Error whose message begins with the file's name.
   [[noreturn]] void fail(const std::string& what) const;
 };

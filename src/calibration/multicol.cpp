@@ -14,10 +14,6 @@ namespace {
 constexpr const char* word_of_camera = "Camera.nrpol";
 constexpr const char* word_of_rig = "CameraSystem.nrCams";
 
-bool contains(const Document& document, const char* word) {
-  return document.text.find(word) != std::string::npos;
-}
-
 View read_view(const Document& document, const std::string& name) {
   View view;
   view.name = name;
@@ -48,13 +44,13 @@ Eigen::Matrix3d rotation_of(const Eigen::Vector3d& c) {
 }  // namespace
 
 bool is_multicol(const Document& document) {
-  return contains(document, word_of_camera) || contains(document, word_of_rig);
+  return document.contains(word_of_camera) || document.contains(word_of_rig);
 }
 
 Rig read_multicol(const Document& document,
                   const std::function<Document(const std::filesystem::path&)>& load) {
   Rig rig;
-  if (contains(document, word_of_camera)) {
+  if (document.contains(word_of_camera)) {
     rig.views.push_back(read_view(document, "cam0"));
     return rig;
   }

@@ -165,9 +165,7 @@ Camera camera_of(const OCamLens& lens, int width, int height, const Document& do
   return camera;
 }
 
-bool is_ocam(const Document& document) {
-  return document.text.find("ocam_model") != std::string::npos;
-}
+bool is_ocam(const Document& document) { return document.contains("ocam_model"); }
 
 Rig read_ocam(const Document& document) {
   const std::vector<std::vector<double>> lines = lines_of_numbers(document);
@@ -195,9 +193,7 @@ Rig read_ocam(const Document& document) {
   return rig;
 }
 
-bool is_omnimvs(const Document& document) {
-  return document.text.find("inv_poly:") != std::string::npos;
-}
+bool is_omnimvs(const Document& document) { return document.contains("inv_poly:"); }
 
 Rig read_omnimvs(const Document& document) {
   Rig rig;

@@ -53,9 +53,7 @@ const char* present(const YamlCamera& keys, const char* first, const char* secon
 
 }  // namespace
 
-bool is_orb_slam(const Document& document) {
-  return document.text.find("Camera.type") != std::string::npos;
-}
+bool is_orb_slam(const Document& document) { return document.contains("Camera.type"); }
 
 Rig read_orb_slam(const Document& document) {
   Rig rig;

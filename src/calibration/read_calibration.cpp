@@ -174,10 +174,6 @@ void require_shallow(const Document& document) {
                 " levels deep, which no calibration is; is it damaged?");
 }
 
-bool contains(const Document& document, const char* text) {
-  return document.text.find(text) != std::string::npos;
-}
-
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
@@ -190,13 +186,13 @@ CalibrationFormat format_of(const Document& document) {
   if (is_vins(document)) return CalibrationFormat::vins;
   // Configurations of VINS-Mono are a camera of CamOdoCal with more keys, some of them matrices.
   if (is_camodocal(document)) return CalibrationFormat::camodocal;
-  if (contains(document, "opencv-matrix") || contains(document, "<opencv_storage")) {
+  if (document.contains("opencv-matrix") || document.contains("<opencv_storage")) {
     return CalibrationFormat::opencv;
   }
   if (document.text[first] == '{') return CalibrationFormat::basalt;
-  if (contains(document, "cam0:")) return CalibrationFormat::kalibr;
-  if (contains(document, "T_BS")) return CalibrationFormat::euroc;
-  if (contains(document, "camera_model")) return CalibrationFormat::kalibr;
+  if (document.contains("cam0:")) return CalibrationFormat::kalibr;
+  if (document.contains("T_BS")) return CalibrationFormat::euroc;
+  if (document.contains("camera_model")) return CalibrationFormat::kalibr;
   document.fail(
       "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
       "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a camera of CamOdoCal, OCamCalib or "

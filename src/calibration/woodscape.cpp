@@ -7,9 +7,7 @@
 
 namespace widestereo::calibration {
 
-bool is_woodscape(const Document& document) {
-  return document.text.find("\"radial_poly\"") != std::string::npos;
-}
+bool is_woodscape(const Document& document) { return document.contains("\"radial_poly\""); }
 
 Rig read_woodscape(const Document& document) {
   Rig rig;
