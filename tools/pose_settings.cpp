@@ -19,8 +19,8 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
   command
       .add_option(
           "--poses-of", of,
-          "What the poses are of: camera (0 of the calibration) or imu (the calibration "
-          "has T_cam_imu, T_imu_cam, T_BS or body_T_cam0); by default as the file's layout says")
+          "What the poses are of: camera (0 of the calibration) or imu (the calibration says where "
+          "it is); by default as the file's layout says")
       ->check(CLI::IsMember({camera, imu}))
       ->needs("--poses")
       ->group(group);
