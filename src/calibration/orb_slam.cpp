@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/orb_slam.h"
 
+#include <array>
 #include <string>
 #include <utility>
 
@@ -15,33 +16,25 @@ Camera read_camera(const Document& document, const YamlCamera& keys, const std::
   const auto number_or_zero = [&](const char* key) {
     return keys.has((prefix + key).c_str()) ? number(key) : 0;
   };
+  const std::string type = keys.text("Camera.type");
   Camera camera;
+  if (type == "KannalaBrandt8") {
+    camera = fisheye_camera(std::array{number("k1"), number("k2"), number("k3"), number("k4")});
+  } else if (type == "PinHole") {
+    camera =
+        rational_camera(document, prefix + "k1",
+                        std::array{number_or_zero("k1"), number_or_zero("k2"), number_or_zero("p1"),
+                                   number_or_zero("p2"), number_or_zero("k3")});
+  } else if (type != "Rectified") {
+    document.fail("The Camera.type \"" + type +
+                  "\" is unknown; use KannalaBrandt8, PinHole or Rectified.");
+  }
   camera.width = keys.side("Camera.width");
   camera.height = keys.side("Camera.height");
   camera.fx = number("fx");
   camera.fy = number("fy");
   camera.cx = number("cx");
   camera.cy = number("cy");
-  const std::string type = keys.text("Camera.type");
-  if (type == "KannalaBrandt8") {
-    camera.model = CameraModel::kannala_brandt;
-    camera.k1 = number("k1");
-    camera.k2 = number("k2");
-    camera.k3 = number("k3");
-    camera.k4 = number("k4");
-  } else if (type == "PinHole") {
-    camera.model = CameraModel::pinhole_radtan;
-    camera.k1 = number_or_zero("k1");
-    camera.k2 = number_or_zero("k2");
-    camera.p1 = number_or_zero("p1");
-    camera.p2 = number_or_zero("p2");
-    camera.k3 = number_or_zero("k3");
-  } else if (type == "Rectified") {
-    camera.model = CameraModel::pinhole;
-  } else {
-    document.fail("The Camera.type \"" + type +
-                  "\" is unknown; use KannalaBrandt8, PinHole or Rectified.");
-  }
   return camera;
 }
 
