@@ -44,7 +44,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
       "--masks", masks,
       "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
       "the pixel");
-  poses.add_to(command, "what is not a COLMAP model or transforms.json needs it", "Data sets");
+  poses.add_to(command, "data sets need it, but of one frame", "Data sets");
   frames.add_to(command);
   size.add_to(command);
 }
@@ -102,12 +102,6 @@ PosedImages PosedImageSettings::of_model() const {
 }
 
 PosedImages PosedImageSettings::of_trajectory() const {
-  if (!poses.given()) {
-    throw ws::Error(rig.calibration +
-                    " is no COLMAP model or transforms.json, so that the poses of the images are "
-                    "not known; give "
-                    "--poses.");
-  }
   const int first = rig.views.empty() ? 0 : rig.views.front();
   const cv::Size of_image = ws::read_image(frames.example(images, first)).size();
   std::vector<int> cameras = rig.views;
@@ -119,8 +113,14 @@ PosedImages PosedImageSettings::of_trajectory() const {
   }
   const ChosenFrames chosen = frames.choose(images, cameras);
   const ws::Rig of_frame = rig.rig_for_images(cameras.size(), of_image);
+  if (!poses.given() && chosen.chosen.size() > 1) {
+    throw ws::Error(rig.calibration +
+                    " is no COLMAP model or transforms.json, so that the poses of the frames are "
+                    "not known; give --poses, or take one frame (--count 1).");
+  }
   const std::vector<Eigen::Isometry3d> world_from_rig =
-      poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses;
+      poses.given() ? poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses
+                    : std::vector{Eigen::Isometry3d::Identity()};
   PosedImages posed;
   posed.origin = world_from_rig.front().translation();
   for (std::size_t k = 0; k < chosen.chosen.size(); ++k) {

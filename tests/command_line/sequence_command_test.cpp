@@ -379,6 +379,19 @@ TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
   EXPECT_EQ(record()["images"].size(), 6U);
 }
 
+TEST_F(SequenceCommand, OneFrameOfARigIsAScene) {
+  const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +
+                                  " -o " + file("out") + quick + "--min-views 1 ";
+  expect_error(reconstruct, "--poses, or take one frame (--count 1)");
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  const Outcome outcome = run(reconstruct + "--first 1 --count 1");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const auto record = nlohmann::json::parse(bytes_of(folder_ / "out/reconstruction.json"));
+  EXPECT_EQ(record["images"].size(), 2U);
+  EXPECT_GT(record["cloud"]["points"].get<int>(), 100);
+  EXPECT_TRUE(fs::exists(folder_ / "out/001/cam1/distance0.tiff"));
+}
+
 TEST_F(SequencePoses, NeedToBeOfWhatTheCalibrationKnows) {
   expect_error(with("imu.csv", "out", "calib.yaml"), "calib.yaml does not say where that is");
   expect_error(with("camera.txt", "out", "calib.yaml") + "--poses-of imu", "T_cam_imu");
