@@ -122,6 +122,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
       poses.given() ? poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses
                     : std::vector{Eigen::Isometry3d::Identity()};
   PosedImages posed;
+  posed.are_of_one_frame = chosen.chosen.size() == 1;
   posed.origin = world_from_rig.front().translation();
   for (std::size_t k = 0; k < chosen.chosen.size(); ++k) {
     const ws::SequenceFrame& frame = chosen.all[chosen.chosen[k]];

@@ -32,6 +32,7 @@ struct PosedImages {
   /// That some images have by what is known of the scene; nothing for options to be taken.
   std::function<std::optional<widestereo::DistanceRange>(const Images&)> distances;
   bool in_metres = true;
+  bool are_of_one_frame = false;  ///< of a rig
   /// Of the frame of the views, in that of the trajectory, metres: coordinates stay small.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 

@@ -5,7 +5,9 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <numeric>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,7 +36,7 @@ const cv::Size preview_size(1024, 768);
 struct ReconstructArguments {
   PosedImageSettings images;
   std::string output;
-  int sources = 2;
+  std::optional<int> sources;  ///< of each image
   bool overwrite = false;
   ws::FusionOptions fusion;
   MatchSettings settings;
@@ -44,10 +46,21 @@ struct ReconstructArguments {
 
 bool is_alone(const Images& group) { return group.size() == 1; }
 
+/// Of each image, but of those of one frame.
+std::size_t sources_of(const ReconstructArguments& arguments) {
+  return static_cast<std::size_t>(arguments.sources.value_or(2));
+}
+
 /// To match with each other; throws Error where no image has another one.
 std::vector<Images> groups_of(const PosedImages& images, const ReconstructArguments& arguments) {
-  std::vector<Images> groups =
-      images.selection->groups(static_cast<std::size_t>(arguments.sources) + 1);
+  const std::size_t all = images.views.size();
+  // Of cameras that look around each sees what but few others do, and there is nothing else.
+  if (images.are_of_one_frame && !arguments.sources && all > 1 && all <= ws::Matcher::most_views) {
+    Images group(all);
+    std::iota(group.begin(), group.end(), 0);
+    return {group};
+  }
+  std::vector<Images> groups = images.selection->groups(1 + sources_of(arguments));
   if (std::all_of(groups.begin(), groups.end(), is_alone)) {
     throw ws::Error(arguments.images.images +
                     " has no images that see the same from different places; by the points of a "
@@ -72,8 +85,8 @@ std::vector<ws::Options> options_of(const std::vector<Images>& groups, const Pos
 
 /// All that decides the results but the images, cameras and poses, which each result names. The
 /// range has the ends that were given: the others are each group's own.
-Json settings_of(const ReconstructArguments& a, const ws::Options& of_group,
-                 const ws::DeviceInfo& device) {
+Json settings_of(const ReconstructArguments& a, const std::vector<Images>& groups,
+                 const ws::Options& of_group, const ws::DeviceInfo& device) {
   Json options = Json::parse(ws::to_json(of_group));
   if (!a.settings.min_distance) options.erase("min_distance");
   if (!a.settings.max_distance) options.erase("max_distance");
@@ -82,7 +95,7 @@ Json settings_of(const ReconstructArguments& a, const ws::Options& of_group,
           {"calibration", absolute_path(a.images.rig.calibration)},
           {"mask", absolute_paths(a.images.rig.masks)},
           {"masks", absolute_path(a.images.masks)},
-          {"sources", a.sources},
+          {"sources", std::max(sources_of(a), groups.front().size() - 1)},
           {"clouds", !a.format.no_cloud},
           {"pictures", !a.format.no_pictures},
           {"device", device.name},
@@ -101,7 +114,8 @@ class Reconstruction {
         folders_(
             arguments.output,
             {.name = "reconstruction", .results = "images", .texts = {}, .numbers = {"accepted"}},
-            settings_of(arguments, options_.front(), device_.info()), arguments.overwrite) {}
+            settings_of(arguments, groups_, options_.front(), device_.info()),
+            arguments.overwrite) {}
 
   void run() {
     const auto alone = std::count_if(groups_.begin(), groups_.end(), is_alone);
@@ -298,10 +312,11 @@ void add_reconstruct_command(CLI::App& app) {
                    "reconstruction.json")
       ->required();
   command
-      ->add_option("--sources", a->sources,
-                   "How many others each image is matched with: groups have one more")
-      ->check(CLI::Range(1, ws::Matcher::most_views - 1))
-      ->capture_default_str();
+      ->add_option(
+          "--sources", a->sources,
+          "How many others each image is matched with: groups have one more; by default 2, "
+          "or all cameras of one frame")
+      ->check(CLI::Range(1, ws::Matcher::most_views - 1));
   command->add_flag("--overwrite", a->overwrite, "Remove the results of an earlier run first");
   const std::string fusion = "Fusion";
   command

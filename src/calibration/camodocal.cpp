@@ -26,7 +26,6 @@ void read_numbers(const YamlCamera& part, Camera& camera, std::initializer_list<
   for (const auto& [key, member] : members) camera.*member = part.number(key);
 }
 
-/// Its first coordinate is the column.
 OCamLens read_ocam_lens(const YamlCamera& polynomial, const YamlCamera& affine) {
   OCamLens lens;
   const auto key = [&lens] {
@@ -35,7 +34,7 @@ OCamLens read_ocam_lens(const YamlCamera& polynomial, const YamlCamera& affine) 
   do {
     lens.polynomial.push_back(polynomial.number(key().c_str()));
   } while (polynomial.has(key().c_str()));
-  lens.matrix << affine.number("ac"), affine.number("ad"), affine.number("ae"), 1;
+  lens.set_columns_first(affine.number("ac"), affine.number("ad"), affine.number("ae"));
   lens.centre = {affine.number("cx"), affine.number("cy")};
   return lens;
 }

@@ -24,8 +24,8 @@ View read_view(const Document& document, const std::string& name) {
     for (int i = 0; i < coefficients; ++i) {
       lens.polynomial.push_back(keys.number(("Camera.a" + std::to_string(i)).c_str()));
     }
-    // Its first coordinate is the column.
-    lens.matrix << keys.number("Camera.c"), keys.number("Camera.d"), keys.number("Camera.e"), 1;
+    lens.set_columns_first(keys.number("Camera.c"), keys.number("Camera.d"),
+                           keys.number("Camera.e"));
     lens.centre = {keys.number("Camera.u0"), keys.number("Camera.v0")};
     view.camera =
         camera_of(lens, keys.side("Camera.Iw"), keys.side("Camera.Ih"), document, view.name);

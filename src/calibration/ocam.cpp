@@ -103,7 +103,7 @@ OCamLens lens_of(std::vector<double> polynomial, const std::vector<double>& cent
   OCamLens lens;
   lens.polynomial = std::move(polynomial);
   lens.centre = {centre[1], centre[0]};
-  lens.matrix << 1, affine[2], affine[1], affine[0];
+  lens.set_rows_first(affine[0], affine[1], affine[2]);
   return lens;
 }
 

@@ -19,6 +19,10 @@ struct OCamLens {
   Eigen::Matrix2d matrix = Eigen::Matrix2d::Identity();
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< pixels
   double max_theta = std::numbers::pi;               ///< radians
+
+  /// The matrix of affine parameters for (row, column), as OCamCalib's, or (column, row).
+  void set_rows_first(double c, double d, double e) { matrix << 1, e, d, c; }
+  void set_columns_first(double c, double d, double e) { matrix << c, d, e, 1; }
 };
 
 /// The polynomial_fisheye camera nearest to the lens, for an image of width x height: within a

@@ -392,6 +392,27 @@ TEST_F(SequenceCommand, OneFrameOfARigIsAScene) {
   EXPECT_TRUE(fs::exists(folder_ / "out/001/cam1/distance0.tiff"));
 }
 
+TEST_F(SequenceCommand, AllCamerasOfOneFrameAreMatchedWithEachOther) {
+  std::string calibration = bytes_of("calib.yaml");
+  const std::string last = calibration.substr(calibration.find("cam1:"));
+  for (const char* camera : {"cam2", "cam3"}) {
+    calibration += camera + last.substr(4);
+    fs::create_directories(folder_ / "data" / camera);
+    fs::copy_file(folder_ / "data/cam0/000.png", folder_ / "data" / camera / "000.png");
+  }
+  folder_.write("four.yaml", calibration);
+  const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("four.yaml") +
+                                  quick + "--min-views 1 --skip-incomplete -o " + file("out");
+  const auto matched_with_last = [this] {
+    return nlohmann::json::parse(bytes_of("out/000/cam3/result.json"))["input"]["images"].size();
+  };
+  const Outcome outcome = run(reconstruct);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(matched_with_last(), 4u);
+  ASSERT_EQ(run(reconstruct + " --sources 2 --overwrite").exit_code, 0);
+  EXPECT_EQ(matched_with_last(), 3u);
+}
+
 TEST_F(SequencePoses, NeedToBeOfWhatTheCalibrationKnows) {
   expect_error(with("imu.csv", "out", "calib.yaml"), "calib.yaml does not say where that is");
   expect_error(with("camera.txt", "out", "calib.yaml") + "--poses-of imu", "T_cam_imu");
