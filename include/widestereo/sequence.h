@@ -32,8 +32,8 @@ std::vector<SequenceFrame> read_sequence(const std::filesystem::path& folder,
                                          const std::vector<int>& cameras,
                                          bool skip_incomplete = false);
 
-/// The same of cameras whose images are in these folders, at least one, each with images, or with
-/// data/ and, or instead of their names, data.csv.
+/// The same of cameras whose images are in these folders, at least one: each holds images, or data/
+/// with images and perhaps data.csv.
 std::vector<SequenceFrame> read_sequence(const std::vector<std::filesystem::path>& camera_folders,
                                          bool skip_incomplete = false);
 

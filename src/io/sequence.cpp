@@ -188,6 +188,7 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
 
 std::vector<SequenceFrame> read_sequence(const std::vector<fs::path>& camera_folders,
                                          bool skip_incomplete) {
+  if (camera_folders.empty()) throw Error("A data set has no cameras; give at least one.");
   std::vector<Images> images;
   for (const fs::path& folder : camera_folders) images.push_back(images_of(folder));
   std::map<std::string, int, InOrder> counts;

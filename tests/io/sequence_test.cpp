@@ -83,6 +83,7 @@ TEST_F(Sequences, FoldersOfCamerasMayHaveAnyNames) {
               }),
               HasSubstr("up"));
   EXPECT_THAT(error(), HasSubstr("--folders"));
+  EXPECT_THAT(error({}), HasSubstr("at least one"));
 }
 
 TEST_F(Sequences, ListsAreInNanosecondsHoweverFewDigitsTheyHave) {
