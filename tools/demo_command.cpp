@@ -20,13 +20,15 @@ struct DemoArguments {
   std::string output = "demo";
   int size = 384;
   bool panorama = false;
+  bool surround = false;
   MatchSettings settings;
   FolderFormat format;
   bool as_json = false;
 };
 
 ws::RenderedPair render(const DemoArguments& arguments) {
-  ws::Rig rig = ws::demo_rig(arguments.size);
+  ws::Rig rig =
+      arguments.surround ? ws::surround_rig(arguments.size) : ws::demo_rig(arguments.size);
   if (arguments.panorama) {
     for (ws::View& view : rig.views) {
       view.camera = ws::whole_sphere(2 * arguments.size, arguments.size);
@@ -51,7 +53,10 @@ void run_demo(DemoArguments arguments) {
   const MatchingRun run = match_images(arguments.settings, pair.rig, images, arguments.output);
   FolderContents contents{.rig = pair.rig, .images = images, .run = run};
   contents.truths = truths;
-  contents.origin = {{"scene", "demo"}, {"size", arguments.size}, {"panorama", arguments.panorama}};
+  contents.origin = {{"scene", "demo"},
+                     {"size", arguments.size},
+                     {"panorama", arguments.panorama},
+                     {"surround", arguments.surround}};
   contents.scores = ws::evaluate(run.result.views[0].distance, run.result.views[0].normals,
                                  truths[0], pair.rig.views[0], pair.rig.views[1]);
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
@@ -77,6 +82,10 @@ void add_demo_command(CLI::App& app) {
       ->capture_default_str();
   command->add_flag("--panorama", arguments->panorama,
                     "See the whole sphere in equirectangular images, in place of two fisheyes");
+  command
+      ->add_flag("--surround", arguments->surround,
+                 "Look around by four fisheyes, in place of two that look ahead")
+      ->excludes("--panorama");
   arguments->format.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print the run's record and the scores as JSON");
   arguments->settings.add_to(*command);

@@ -28,8 +28,12 @@ struct RenderedPair {
 /// `size` is the side of the square images in pixels; the field of view does not depend on it.
 Rig demo_rig(int size);
 
-/// What they see: a textured room with slanted and curved surfaces and occlusions, which reach
-/// beyond 90 degrees off axis.
+/// Four such cameras on a circle of 0.2 m radius that look outwards, each by 90 degrees to the
+/// right of the one before, so that every direction is seen by two of them or more.
+Rig surround_rig(int size);
+
+/// What the demo's cameras see: a textured room with slanted and curved surfaces and occlusions,
+/// which reach beyond 90 degrees off axis.
 RenderedPair render_demo(int size, std::uint32_t seed = 1);
 
 /// The same seen after the rig has moved to `world_from_rig` (metres; the demo is the identity).

@@ -84,6 +84,26 @@ Rig demo_rig(int size) {
   return rig;
 }
 
+Rig surround_rig(int size) {
+  const Rig demo = demo_rig(size);
+  Rig rig;
+  constexpr int cameras = 4;
+  const auto on_circle = [](int i) {
+    return Eigen::Isometry3d(
+        Eigen::AngleAxisd(i * (360 / cameras) * degree, Eigen::Vector3d::UnitY()) *
+        Eigen::Translation3d(0, 0, 0.2));
+  };
+  for (int i = 0; i < cameras; ++i) {
+    View& view = rig.views.emplace_back(demo.views[static_cast<std::size_t>(i % 2)]);
+    view.name = "cam" + std::to_string(i);
+    view.world_from_camera = on_circle(0).inverse() * on_circle(i);
+    // The same lenses with the whole of their wider field of view in the image.
+    view.camera.max_theta = 110 * degree;
+    for (double* focal_length : {&view.camera.fx, &view.camera.fy}) *focal_length *= 0.73;
+  }
+  return rig;
+}
+
 std::pair<double, double> demo_distance_range() { return {0.4, 8}; }
 
 RenderedPair render_demo(int size, std::uint32_t seed) {

@@ -46,6 +46,20 @@ TEST_F(Command, DemoShowsPanoramas) {
   EXPECT_LT(behind["bad_pixels"]["1.0"].get<double>(), 0.1);
 }
 
+TEST_F(Command, DemoLooksAround) {
+  const Outcome outcome =
+      run("demo --surround --size 128 --preset fast --device cpu --json -o " + file("demo"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  ASSERT_EQ(record["views"].size(), 4u);
+  for (const nlohmann::json& view : record["views"]) {
+    EXPECT_GT(view["accepted"].get<double>(), 0.75) << view["name"];
+  }
+  EXPECT_EQ(record["scores"][0]["completeness"], 1.0) << "all is seen by one or another";
+  const nlohmann::json& seen_by_the_next = record["scores"][1];
+  EXPECT_LT(seen_by_the_next["bad_pixels"]["1.0"].get<double>(), 0.1);
+}
+
 TEST_F(Command, DepthWritesEveryFormatAndJson) {
   const Outcome outcome = run(depth_of("left.png", "right.png") + "--formats tiff,pfm,png --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
