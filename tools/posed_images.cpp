@@ -102,6 +102,11 @@ PosedImages PosedImageSettings::of_model() const {
 }
 
 PosedImages PosedImageSettings::of_trajectory() const {
+  if (!poses.given() && frames.count != 1) {
+    throw ws::Error(rig.calibration +
+                    " is no COLMAP model or transforms.json, so that the poses of the frames are "
+                    "not known; give --poses, or take one frame (--count 1).");
+  }
   const int first = rig.views.empty() ? 0 : rig.views.front();
   const cv::Size of_image = ws::read_image(frames.example(images, first)).size();
   std::vector<int> cameras = rig.views;
@@ -113,11 +118,6 @@ PosedImages PosedImageSettings::of_trajectory() const {
   }
   const ChosenFrames chosen = frames.choose(images, cameras);
   const ws::Rig of_frame = rig.rig_for_images(cameras.size(), of_image);
-  if (!poses.given() && chosen.chosen.size() > 1) {
-    throw ws::Error(rig.calibration +
-                    " is no COLMAP model or transforms.json, so that the poses of the frames are "
-                    "not known; give --poses, or take one frame (--count 1).");
-  }
   const std::vector<Eigen::Isometry3d> world_from_rig =
       poses.given() ? poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses
                     : std::vector{Eigen::Isometry3d::Identity()};

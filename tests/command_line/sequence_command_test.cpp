@@ -402,7 +402,7 @@ TEST_F(SequenceCommand, AllCamerasOfOneFrameAreMatchedWithEachOther) {
   }
   folder_.write("four.yaml", calibration);
   const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("four.yaml") +
-                                  quick + "--min-views 1 --skip-incomplete -o " + file("out");
+                                  quick + "--min-views 1 --skip-incomplete --count 1 -o " + file("out");
   const auto matched_with_last = [this] {
     return nlohmann::json::parse(bytes_of("out/000/cam3/result.json"))["input"]["images"].size();
   };
