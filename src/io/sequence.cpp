@@ -46,6 +46,7 @@ struct InOrder {
 /// Images of one camera by what frames are matched by: names, or nanoseconds where a list gives
 /// them.
 struct Images {
+  fs::path folder;
   std::map<std::string, fs::path, InOrder> of_frames;
   bool listed = false;
 };
@@ -74,7 +75,8 @@ Images images_in(const fs::path& folder) {
 Images images_listed_in(const fs::path& list) {
   std::ifstream file(list);
   if (!file) throw Error("Cannot read " + list.string() + "; check its permissions.");
-  Images images{.of_frames = {}, .listed = true};
+  Images images;
+  images.listed = true;
   std::map<std::string, int> lines;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
@@ -116,9 +118,11 @@ bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::di
 /// Of one camera, listed or not.
 Images images_of(const fs::path& folder) {
   const fs::path list = folder / "data.csv";
-  if (type_of(list) == fs::file_type::regular) return images_listed_in(list);
-  if (is_folder(folder / "data")) return images_in(folder / "data");
-  return images_in(folder);
+  Images images = type_of(list) == fs::file_type::regular ? images_listed_in(list)
+                  : is_folder(folder / "data")            ? images_in(folder / "data")
+                                                          : images_in(folder);
+  images.folder = folder;
+  return images;
 }
 
 /// Where the images of camN are in either layout.
@@ -158,6 +162,43 @@ std::optional<std::int64_t> whole_number(const std::string& digits) {
   return value;
 }
 
+/// The frames of all cameras together.
+std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool skip_incomplete) {
+  if (images.empty()) throw Error("A data set has no cameras; give at least one.");
+  std::map<std::string, int, InOrder> counts;
+  for (const Images& of_camera : images) {
+    for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
+  }
+  const bool have_times = std::any_of(images.begin(), images.end(),
+                                      [](const Images& of_camera) { return of_camera.listed; });
+  std::vector<SequenceFrame> frames;
+  for (const auto& [key, count] : counts) {
+    SequenceFrame frame;
+    frame.nanoseconds = have_times ? whole_number(key) : time_in_name(key);
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const auto found = images[i].of_frames.find(key);
+      if (found != images[i].of_frames.end()) {
+        frame.images.push_back(found->second);
+      } else if (!skip_incomplete) {
+        throw Error("The frame " + key + " has no image in " + images[i].folder.string() + " (" +
+                    std::to_string(images[i].of_frames.size()) + " of " +
+                    std::to_string(counts.size()) +
+                    " frames have one); add it, or leave such frames out (--skip-incomplete).");
+      }
+    }
+    if (frame.images.size() != images.size()) continue;
+    frame.name = frame.images.front().stem().string();
+    frames.push_back(std::move(frame));
+  }
+  if (frames.empty()) {
+    throw Error("No frame has images of all cameras, beginning with those in " +
+                images.front().folder.string() +
+                "; images of one frame must have equal names or times.");
+  }
+  require_usable_names(frames);
+  return frames;
+}
+
 }  // namespace
 
 std::optional<std::int64_t> time_in_name(const std::string& name) {
@@ -188,41 +229,9 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
 
 std::vector<SequenceFrame> read_sequence(const std::vector<fs::path>& camera_folders,
                                          bool skip_incomplete) {
-  if (camera_folders.empty()) throw Error("A data set has no cameras; give at least one.");
   std::vector<Images> images;
   for (const fs::path& folder : camera_folders) images.push_back(images_of(folder));
-  std::map<std::string, int, InOrder> counts;
-  for (const Images& of_camera : images) {
-    for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
-  }
-  const bool have_times = std::any_of(images.begin(), images.end(),
-                                      [](const Images& of_camera) { return of_camera.listed; });
-  std::vector<SequenceFrame> frames;
-  for (const auto& [key, count] : counts) {
-    SequenceFrame frame;
-    frame.nanoseconds = have_times ? whole_number(key) : time_in_name(key);
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      const auto found = images[i].of_frames.find(key);
-      if (found != images[i].of_frames.end()) {
-        frame.images.push_back(found->second);
-      } else if (!skip_incomplete) {
-        throw Error("The frame " + key + " has no image in " + camera_folders[i].string() + " (" +
-                    std::to_string(images[i].of_frames.size()) + " of " +
-                    std::to_string(counts.size()) +
-                    " frames have one); add it, or leave such frames out (--skip-incomplete).");
-      }
-    }
-    if (frame.images.size() != images.size()) continue;
-    frame.name = frame.images.front().stem().string();
-    frames.push_back(std::move(frame));
-  }
-  if (frames.empty()) {
-    throw Error("No frame has images of all cameras, beginning with those in " +
-                camera_folders.front().string() +
-                "; images of one frame must have equal names or times.");
-  }
-  require_usable_names(frames);
-  return frames;
+  return frames_of(images, skip_incomplete);
 }
 
 std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
@@ -230,9 +239,9 @@ std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vect
   if (!is_folder(folder)) {
     throw Error("There is no folder " + folder.string() + "; check the path.");
   }
-  std::vector<fs::path> camera_folders;
-  for (const int camera : cameras) camera_folders.push_back(camera_folder(folder, camera));
-  return read_sequence(camera_folders, skip_incomplete);
+  std::vector<Images> images;
+  for (const int camera : cameras) images.push_back(images_of(camera_folder(folder, camera)));
+  return frames_of(images, skip_incomplete);
 }
 
 }  // namespace widestereo

@@ -402,7 +402,8 @@ TEST_F(SequenceCommand, AllCamerasOfOneFrameAreMatchedWithEachOther) {
   }
   folder_.write("four.yaml", calibration);
   const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("four.yaml") +
-                                  quick + "--min-views 1 --skip-incomplete --count 1 -o " + file("out");
+                                  quick + "--min-views 1 --skip-incomplete --count 1 -o " +
+                                  file("out");
   const auto matched_with_last = [this] {
     return nlohmann::json::parse(bytes_of("out/000/cam3/result.json"))["input"]["images"].size();
   };
@@ -434,7 +435,7 @@ TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {
     EXPECT_FALSE(fs::exists(folder_ / "out/000")) << arguments;
   };
   expect(sequence("out", "nowhere"), "nowhere");
-  for (const char* camera : {"empty/cam0", "empty/cam1"}) fs::create_directories(folder_ / camera);
+  fs::create_directories(folder_ / "empty/cam0");
   expect(sequence("out", "empty"), "no images");
   expect(sequence() + "--first 3", "3 frames");
   expect(sequence() + "--views 0,2", "cam2");
