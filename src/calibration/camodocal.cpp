@@ -47,7 +47,8 @@ View read_view(const Document& document, const std::string& name) {
     const YamlCamera keys(document, name, root);
     Camera& camera = view.camera;
     std::string model = keys.text("model_type");
-    for (char& letter : model) letter = static_cast<char>(std::toupper(letter));
+    for (char& letter : model)
+      letter = static_cast<char>(std::toupper(static_cast<unsigned char>(letter)));
     const int width = keys.side("image_width");
     const int height = keys.side("image_height");
     const auto part = [&](const char* key) { return part_of(document, name, root, key); };
