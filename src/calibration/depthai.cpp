@@ -56,7 +56,7 @@ Camera read_camera(const Document& document, const std::string& name, const Yaml
   if (type == perspective) {
     camera = rational_camera(document, name + ": The distortionCoeff", coefficients);
   } else if (type == fisheye && coefficients.size() >= 4) {
-    camera = fisheye_camera(coefficients);
+    set_fisheye(camera, coefficients);
   } else {
     document.fail(name +
                   ": The cameraType is none of 0 (perspective) and 1 (fisheye), with the "

@@ -40,7 +40,7 @@ void set_unified_from_alpha(Camera& camera, double alpha);
 double unified_alpha(const Camera& camera);
 
 /// cv::fisheye's model and its four coefficients.
-Camera fisheye_camera(std::span<const double> coefficients);
+void set_fisheye(Camera& camera, std::span<const double> coefficients);
 /// A pinhole with coefficients in cv::stereoCalibrate()'s order, in as simple a model as they
 /// allow. Fails where those of a tilted sensor are not 0; `what` has them.
 Camera rational_camera(const Document& document, const std::string& what,

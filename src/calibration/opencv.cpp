@@ -125,8 +125,9 @@ Camera read_lens(const Document& document, const Storage& storage, const CameraK
     return camera;
   }
   // Files of cv::stereoCalibrate have five or more.
-  if (c.size() == kannala_brandt_coefficients) return fisheye_camera(c);
-  return rational_camera(document, what, c);
+  if (c.size() != kannala_brandt_coefficients) return rational_camera(document, what, c);
+  set_fisheye(camera, c);
+  return camera;
 }
 
 Camera read_camera(const Document& document, const Storage& storage, const CameraKeys& keys,
@@ -159,14 +160,12 @@ Eigen::Isometry3d second_from_first(const Storage& storage, const Document& docu
 
 }  // namespace
 
-Camera fisheye_camera(std::span<const double> coefficients) {
-  Camera camera;
+void set_fisheye(Camera& camera, std::span<const double> coefficients) {
   camera.model = CameraModel::kannala_brandt;
   camera.k1 = coefficients[0];
   camera.k2 = coefficients[1];
   camera.k3 = coefficients[2];
   camera.k4 = coefficients[3];
-  return camera;
 }
 
 Camera rational_camera(const Document& document, const std::string& what,

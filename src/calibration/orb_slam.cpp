@@ -19,7 +19,7 @@ Camera read_camera(const Document& document, const YamlCamera& keys, const std::
   const std::string type = keys.text("Camera.type");
   Camera camera;
   if (type == "KannalaBrandt8") {
-    camera = fisheye_camera(std::array{number("k1"), number("k2"), number("k3"), number("k4")});
+    set_fisheye(camera, std::array{number("k1"), number("k2"), number("k3"), number("k4")});
   } else if (type == "PinHole") {
     camera =
         rational_camera(document, prefix + "k1",

@@ -251,12 +251,7 @@ void YamlCamera::set_distortion(Camera& camera) const {
     camera.p2 = d[3];
     camera.model = pinhole ? CameraModel::pinhole_radtan : CameraModel::mei;
   } else if (model == "equidistant" && pinhole) {
-    const std::vector<double> d = numbers(coefficients, 4);
-    camera.k1 = d[0];
-    camera.k2 = d[1];
-    camera.k3 = d[2];
-    camera.k4 = d[3];
-    camera.model = CameraModel::kannala_brandt;
+    set_fisheye(camera, numbers(coefficients, 4));
   } else if (model == "fov" && pinhole) {
     camera.omega = numbers(coefficients, 1)[0];
     camera.model = CameraModel::field_of_view;
