@@ -28,8 +28,9 @@ struct RenderedPair {
 /// `size` is the side of the square images in pixels; the field of view does not depend on it.
 Rig demo_rig(int size);
 
-/// Four such cameras on a circle of 0.2 m radius that look outwards, each by 90 degrees to the
-/// right of the one before, so that every direction is seen by two of them or more.
+/// Four cameras of 220 degrees on a circle of 0.2 m radius that look outwards, each by 90 degrees
+/// to the right of the one before, so that all but what is very near is seen by two of them or
+/// more.
 Rig surround_rig(int size);
 
 /// What the demo's cameras see: a textured room with slanted and curved surfaces and occlusions,

@@ -12,8 +12,8 @@
 
 namespace widestereo::calibration {
 
-/// OCam's model: a pixel is `matrix` (x, y) + centre, its ray (x, y, |f(r)|) with the polynomial f
-/// of the radius r of (x, y), in pixels. Where f(0) is negative, as OCamCalib's, f is -z.
+/// OCam's model: a pixel is `matrix` (x, y) + centre, its ray (x, y, z) with the polynomial f of
+/// the radius of (x, y), in pixels, for z, or for -z where f(0) is negative, as OCamCalib's is.
 struct OCamLens {
   std::vector<double> polynomial;  ///< of f, lowest power first
   Eigen::Matrix2d matrix = Eigen::Matrix2d::Identity();
