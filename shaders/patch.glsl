@@ -217,17 +217,23 @@ FN int first_column(CONTEXT_ARGUMENT int radius, int row) {
   return -radius + (PATTERN == PATTERN_CHECKERBOARD ? (radius + row) & 1 : 0);
 }
 
-// About exp(a) for a >= 0: the 8th power of 1 + a / 8, with the same bits everywhere (elementary.glsl).
-FN float growth(float a) {
-  float t = 1.0f + 0.125f * a;
+// About exp(a) for a >= 0 with the same bits everywhere (elementary.glsl): the 8th power of this. A sum's is that of
+// the product.
+FN float eighth_of_growth(float a) { return 1.0f + 0.125f * a; }
+
+FN float eighth_power(float t) {
   t = t * t;
   t = t * t;
   return t * t;
 }
 
-// From 1 on, how unlike two intensities of the reference are: pixels of one surface mostly are alike. `inverse_scale`:
-// PARAMETERS.support.y, which loops read once.
-FN float unlikeness(float a, float b, float inverse_scale) { return growth(abs(a - b) * inverse_scale); }
+FN float growth(float a) { return eighth_power(eighth_of_growth(a)); }
+
+// From 1 on, how unlike two intensities of the reference are: pixels of one surface mostly are alike; the eighth root
+// of it. `inverse_scale`: PARAMETERS.support.y, which loops read once.
+FN float eighth_of_unlikeness(float a, float b, float inverse_scale) {
+  return 1.0f + (0.125f * inverse_scale) * abs(a - b);
+}
 
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
 // which loops read once. Zero for masked samples; others differ by 1 at most.

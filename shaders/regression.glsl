@@ -25,7 +25,7 @@
 #define LARGEST_SLOPE_CHANGE 6.0f
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
-// Tangent coordinates of neighbouring rays are multiplied by this, so that they are of order 1.
+// Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
 #define TANGENT_SCALE 128.0f
 
 // Direction in the reference image, per pixel of displacement along `along` (unit) in the source: the inverse of
@@ -178,7 +178,8 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, w, centre));
 }
 
-// Inverse distance relative to the pixel's tangent plane: offset + slope_x x + slope_y y.
+// A plane's vector m by components, along the pixel's ray and along east and south, which are TANGENT_SCALE long:
+// inverse distance in any direction is offset z + slope_x x + slope_y y, with the direction's products with these.
 struct LocalPlane {
   float offset;
   float slope_x;
@@ -201,51 +202,61 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float fall_off = 2.0f / float(radius * radius);
   float inverse_scale = PARAMETERS.support.y;
+  float twice_own = 2.0f * own.x;
   int step = max(radius / PASS.steps, 1);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
-  int first_x = int(u.x * float(step)) - step / 2 - radius + radius % step;
-  int first_y = int(u.y * float(step)) - step / 2 - radius + radius % step;
+  int first_x = pixel.x + int(u.x * float(step)) - step / 2 - radius + radius % step;
+  int first_y = pixel.y + int(u.y * float(step)) - step / 2 - radius + radius % step;
+  while (first_x < 0) first_x += step;
+  while (first_y < 0) first_y += step;
+  int last_x = min(pixel.x + radius, size.x - 1);
+  int last_y = min(pixel.y + radius, size.y - 1);
   float s = 0.0f;
   float sx = 0.0f;
   float sy = 0.0f;
   float sxx = 0.0f;
   float sxy = 0.0f;
   float syy = 0.0f;
-  float sw = 0.0f;
-  float sxw = 0.0f;
-  float syw = 0.0f;
-  for (int dy = first_y; dy <= radius; dy += step) {
-    for (int dx = first_x; dx <= radius; dx += step) {
-      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      if (!in_image(size, q)) continue;
+  float sr = 0.0f;
+  float sxr = 0.0f;
+  float syr = 0.0f;
+  for (int qy = first_y; qy <= last_y; qy += step) {
+    float dy = float(qy - pixel.y);
+    float remoteness_of_row = eighth_of_growth(dy * dy * fall_off);
+    float dx = float(first_x - pixel.x);
+    for (int qx = first_x; qx <= last_x; qx += step) {
+      ivec2 q = ivec2(qx, qy);
       vec4 measure = check_at(CONTEXT PASS.reference, q);
-      if (measure.x >= UNMEASURED_VARIANCE) continue;
       vec4 r = ray_at(CONTEXT PASS.reference, q);
       vec3 direction = vec3(r.x, r.y, r.z);
-      float forward = dot(direction, ray);
-      if (forward < 0.1f) continue;
-      float x = TANGENT_SCALE * dot(direction, east) / forward;
-      float y = TANGENT_SCALE * dot(direction, south) / forward;
-      float w = measure.z / forward;
-      float residual = (w - guess.offset - guess.slope_x * x - guess.slope_y * y) * measure.y;
-      // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own.
-      float scale2 = 2.0f * min(measure.x + own.x, LARGEST_RESIDUAL * LARGEST_RESIDUAL);
-      float doubt = 1.0f + residual * residual / scale2;
-      float weight = measure.y * measure.y /
-                     (measure.x * doubt * doubt * growth(float(dx * dx + dy * dy) * fall_off) *
-                      unlikeness(measure.w, own.w, inverse_scale));
-      s += weight;
-      sx += weight * x;
-      sy += weight * y;
-      sxx += weight * x * x;
-      sxy += weight * x * y;
-      syy += weight * y * y;
-      // Relative to the guess, which keeps the sums small.
-      float difference = w - guess.offset;
-      sw += weight * difference;
-      sxw += weight * difference * x;
-      syw += weight * difference * y;
+      float x = dot(direction, east);
+      float y = dot(direction, south);
+      float z = dot(direction, ray);
+      float residual = measure.z - guess.offset * z - guess.slope_x * x - guess.slope_y * y;
+      float displacement = residual * measure.y;
+      // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own. Everything that
+      // weighs shares one division.
+      float scale2 = min(2.0f * measure.x + twice_own, 2.0f * LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      float doubt = scale2 + displacement * displacement;
+      float remoteness = remoteness_of_row + (0.125f * fall_off) * (dx * dx);
+      float unlikeness = eighth_of_unlikeness(measure.w, own.w, inverse_scale);
+      float trust = measure.y * scale2;
+      float weight = trust * trust * (1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness)));
+      if (measure.x >= UNMEASURED_VARIANCE) weight = 0.0f;
+      float zw = weight * z;
+      float xw = weight * x;
+      float yw = weight * y;
+      s += zw * z;
+      sx += zw * x;
+      sy += zw * y;
+      sxx += xw * x;
+      sxy += xw * y;
+      syy += yw * y;
+      sr += zw * residual;
+      sxr += xw * residual;
+      syr += yw * residual;
+      dx += float(step);
     }
   }
   fit.certainty = s * float(step * step);
@@ -257,14 +268,16 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float cxx = sxx - sx * mx + pull;
   float cxy = sxy - sx * my;
   float cyy = syy - sy * my + pull;
-  float cxw = sxw - sw * mx + pull * guess.slope_x;
-  float cyw = syw - sw * my + pull * guess.slope_y;
+  float cxr = sxr - sr * mx;
+  float cyr = syr - sr * my;
   float determinant = cxx * cyy - cxy * cxy;
   if (!(determinant > 1e-9f * cxx * cyy)) return false;
   fit.information = vec3(cxx, cxy, cyy);
-  fit.plane.slope_x = (cyy * cxw - cxy * cyw) / determinant;
-  fit.plane.slope_y = (cxx * cyw - cxy * cxw) / determinant;
-  fit.plane.offset = guess.offset + sw / s - fit.plane.slope_x * mx - fit.plane.slope_y * my;
+  float turn_x = (cyy * cxr - cxy * cyr) / determinant;
+  float turn_y = (cxx * cyr - cxy * cxr) / determinant;
+  fit.plane.slope_x = guess.slope_x + turn_x;
+  fit.plane.slope_y = guess.slope_y + turn_y;
+  fit.plane.offset = guess.offset + sr / s - turn_x * mx - turn_y * my;
   return true;
 }
 
@@ -326,17 +339,16 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   if (is_usable(CONTEXT pixel, usable_ray) && held.w < INVALID_COST) {
     vec3 axis = abs(ray.x) < 0.7f ? vec3(1.0f, 0.0f, 0.0f) : vec3(0.0f, 1.0f, 0.0f);
     vec3 east = cross(ray, axis);
-    east = (1.0f / length(east)) * east;
+    east = (TANGENT_SCALE / length(east)) * east;
     vec3 south = cross(ray, east);
     LocalPlane plane;
     plane.offset = dot(m, ray);
-    plane.slope_x = dot(m, east) / TANGENT_SCALE;
-    plane.slope_y = dot(m, south) / TANGENT_SCALE;
+    plane.slope_x = dot(m, east) / (TANGENT_SCALE * TANGENT_SCALE);
+    plane.slope_y = dot(m, south) / (TANGENT_SCALE * TANGENT_SCALE);
     vec4 own = check_at(CONTEXT PASS.reference, pixel);
     bool found = PASS.deviation > 0.0f ? regress_plane(CONTEXT pixel, ray, east, south, own, plane)
                                          : regress_slopes(CONTEXT pixel, ray, east, south, own, plane);
-    vec3 regressed = plane.offset * ray + (TANGENT_SCALE * plane.slope_x) * east +
-                     (TANGENT_SCALE * plane.slope_y) * south;
+    vec3 regressed = plane.offset * ray + plane.slope_x * east + plane.slope_y * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);
   }
   store_prior(CONTEXT PASS.reference, pixel, prior);

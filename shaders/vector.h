@@ -71,6 +71,10 @@ template <class T>
 FN T min(T a, T b) { return b < a ? b : a; }
 template <class T>
 FN T max(T a, T b) { return a < b ? b : a; }
+#ifdef __CUDA_ARCH__
+FN float min(float a, float b) { return ::fminf(a, b); }
+FN float max(float a, float b) { return ::fmaxf(a, b); }
+#endif
 template <class T>
 FN T clamp(T a, T low, T high) { return min(max(a, low), high); }
 template <class T>
