@@ -200,14 +200,15 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.certainty = 0.0f;
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
-  float fall_off = 2.0f / float(radius * radius);
   float inverse_scale = PARAMETERS.support.y;
   float twice_own = 2.0f * own.x;
   int step = max(radius / PASS.steps, 1);
+  radius = min(radius, step * PASS.steps);
+  float fall_off = 2.0f / float(radius * radius);
   // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
-  int first_x = pixel.x + int(u.x * float(step)) - step / 2 - radius + radius % step;
-  int first_y = pixel.y + int(u.y * float(step)) - step / 2 - radius + radius % step;
+  int first_x = pixel.x - radius + int(u.x * float(step)) - step / 2;
+  int first_y = pixel.y - radius + int(u.y * float(step)) - step / 2;
   while (first_x < 0) first_x += step;
   while (first_y < 0) first_y += step;
   int last_x = min(pixel.x + radius, size.x - 1);
