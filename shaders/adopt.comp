@@ -16,6 +16,8 @@
 #include "pyramid.glsl"
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
+#include "measure.glsl"
+#include "plane_fit.glsl"
 #include "regression.glsl"
 
 void main() {

@@ -16,7 +16,7 @@
 #include "pyramid.glsl"
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
-#include "regression.glsl"
+#include "measure.glsl"
 
 void main() {
   ivec2 pixel;

@@ -50,11 +50,12 @@ struct ViewResult {
 
 /// Work of a kernel, counted from the order of kernels and the parameters for comparing times with
 /// what a device can do: all pixels count, and all patches with full windows, so that a kernel may
-/// do somewhat less.
+/// do somewhat less. Regressions, which ask wider neighbourhoods where smaller ones do not tell,
+/// count with the fewest.
 struct KernelWork {
   double samples = 0;  ///< patch samples, in each source view
-  /// Single-precision additions, multiplications, divisions, roots and elementary functions of the
-  /// patches; what else kernels compute is not counted.
+  /// Single-precision additions, multiplications, divisions, roots and elementary functions of
+  /// patches and regressions; what else kernels compute is not counted.
   double operations = 0;
   double texels = 0;  ///< of source images that the samples blend, four each
   /// What moves to and from memory if every launch reads and writes each pixel of its maps once.

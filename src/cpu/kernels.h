@@ -129,6 +129,8 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "interpolation.glsl"
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
+#include "measure.glsl"
+#include "plane_fit.glsl"
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"

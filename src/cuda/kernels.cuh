@@ -128,6 +128,8 @@ struct Algorithm {
 #include "interpolation.glsl"
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
+#include "measure.glsl"
+#include "plane_fit.glsl"
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"

@@ -381,7 +381,7 @@ class Builder {
     return std::max(options_.regression_precision * std::pow(share, i), finest);
   }
 
-  /// `how` of measure() and regress(): see shaders/regression.glsl.
+  /// `how` of measure() and regress(): see shaders/measure.glsl and regression.glsl.
   void measure(int view, unsigned how) {
     kernel::PassParameters pass = pass_of(view);
     pass.candidates = how;

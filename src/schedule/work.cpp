@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "schedule/work.h"
 
+#include <algorithm>
 #include <array>
 
 namespace widestereo {
@@ -157,6 +158,18 @@ Traffic traffic_of(const Dispatch& dispatch) {
   return {};
 }
 
+/// Of a pixel that its smallest neighbourhood determines, and that one more tells the normal of
+/// where the dispatch asks for normals.
+double regression_operations(const Dispatch& dispatch) {
+  if (dispatch.kernel != Kernel::regress) return 0;
+  const kernel::PassParameters& pass = dispatch.pass;
+  const bool normals = pass.deviation == 0 || (pass.candidates & REGRESS_NORMALS) != 0;
+  const FitOperations operations;
+  const int side = side_of_fit(std::max(pass.radius / 8, 2), pass.steps);
+  return (normals ? 2 : 1) *
+         (operations.of_fit + side * (operations.of_row + side * operations.of_neighbour));
+}
+
 }  // namespace
 
 PatchOperations patch_operations(const KernelConstants& c) {
@@ -183,6 +196,11 @@ PatchOperations patch_operations(const KernelConstants& c) {
   return operations;
 }
 
+int side_of_fit(int radius, int steps) {
+  const int step = std::max(radius / steps, 1);
+  return 2 * std::min(radius / step, steps) + 1;
+}
+
 KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const PatchOperations operations = patch_operations(schedule.constants);
   const auto samples = static_cast<double>(dispatch.samples);
@@ -193,7 +211,8 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const Traffic traffic = traffic_of(dispatch);
   const int sources = schedule.constants.source_count;
   return {.samples = samples,
-          .operations = samples * operations.of_sample + patches * operations.of_patch,
+          .operations = samples * operations.of_sample + patches * operations.of_patch +
+                        pixels * regression_operations(dispatch),
           .texels = 4 * samples,
           .bytes = pixels * (bytes_of(traffic.read) + bytes_of(traffic.written) +
                              sources * bytes_of(traffic.read_in_sources))};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the kernels of a schedule have to do at most (see KernelWork), for comparing times with what
-// a device can do.
+// What the kernels of a schedule have to do (see KernelWork), for comparing times with what a device
+// can do.
 #pragma once
 
 #include "schedule/schedule.h"
@@ -17,7 +17,18 @@ struct PatchOperations {
 };
 PatchOperations patch_operations(const KernelConstants& constants);
 
-/// Work of one dispatch: of all pixels, patches at full windows (see KernelWork).
+/// Those of shaders/plane_fit.glsl, counted likewise.
+struct FitOperations {
+  int of_neighbour = 66;  ///< in the loop over a row of neighbours
+  int of_row = 3;
+  int of_fit = 41;  ///< around both loops, after random numbers
+};
+
+/// Neighbours on a side of the grid to which a plane is fitted.
+int side_of_fit(int radius, int steps);
+
+/// Work of one dispatch: of all pixels, patches at full windows, regressions with the fewest rounds
+/// (see KernelWork).
 KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch);
 
 }  // namespace widestereo

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The shared patch cost compiled with a number that counts what is done with it.
+// The shared patch cost and plane fit compiled with a number that counts what is done with it.
 #pragma once
 
 #include <bit>
@@ -98,11 +98,18 @@ inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
 inline vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return numbers<vec4>(kernel::cpu::hypothesis_at(context.plain, view, p));
 }
+inline vec4 check_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return numbers<vec4>(kernel::cpu::check_at(context.plain, view, p));
+}
+inline vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
+  return numbers<vec4>(kernel::cpu::draw4(context.plain, pixel, slot));
+}
 
 #define float Number
 // clang-format off
 #include "plane.glsl"
 #include "patch.glsl"
+#include "plane_fit.glsl"
 // clang-format on
 #undef float
 

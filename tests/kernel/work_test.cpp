@@ -68,6 +68,31 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
   }
 }
 
+TEST(Work, OfAPlaneFitIsWhatRunningItTakes) {
+  KernelFixture fixture(fisheye_rig(96), Options::preset_named("fast"));
+  fixture.set_reference(0);
+  fixture.view(0).checks.setTo(cv::Scalar(0.01, 3, 0.5, 0.5));
+  for (const auto& [radius, steps] : {std::pair(3, 4), std::pair(5, 4), std::pair(12, 6)}) {
+    SCOPED_TRACE(radius);
+    fixture.pass().steps = steps;
+    const counting::Context context{
+        counting::numbers<counting::MatchParameters>(fixture.schedule().parameters),
+        counting::numbers<counting::PassParameters>(fixture.pass()), fixture.schedule().constants,
+        fixture.context()};
+    const counting::vec3 ray(0, 0, 1), east(TANGENT_SCALE, 0, 0), south(0, TANGENT_SCALE, 0);
+    const counting::LocalPlane guess{0.5f, 0.0f, 0.0f};
+    counting::PlaneFit fit;
+    counting::counts = {};
+    EXPECT_TRUE(counting::fit_plane(context, {48, 48}, ray, east, south,
+                                    counting::check_at(context, 0, {48, 48}), 0, radius, guess,
+                                    fit));
+    const FitOperations expected;
+    const int side = side_of_fit(radius, steps);
+    EXPECT_EQ(counting::counts.operations,
+              expected.of_fit + side * (expected.of_row + side * expected.of_neighbour));
+  }
+}
+
 TEST(Work, OfAScheduleAddsUp) {
   Options options = Options::preset_named("paper");
   options.first_iterations = 1;

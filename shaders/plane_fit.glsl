@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+// The plane of a neighbourhood: inverse distance is exactly linear in the ray, so that it is a linear least-squares
+// problem, here a robust one, weighted by how precisely each pixel was measured.
+
+// Largest scale (px) of the robust weights.
+#define LARGEST_RESIDUAL 0.6f
+// First random slot; the search uses lower ones.
+#define REGRESSION_SLOT 64
+// Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
+#define TANGENT_SCALE 128.0f
+
+// A plane's vector m by components, along the pixel's ray and along east and south, which are TANGENT_SCALE long:
+// inverse distance in any direction is offset z + slope_x x + slope_y y, with the direction's products with these.
+struct LocalPlane {
+  float offset;
+  float slope_x;
+  float slope_y;
+};
+
+struct PlaneFit {
+  LocalPlane plane;
+  float certainty;   // inverse variance of the offset, as if each pixel of the neighbourhood were measured by itself
+  vec3 information;  // inverse covariance of the slopes (xx, xy, yy), of the grid's pixels alone
+};
+
+// One round of robust weighted least squares over a sparse grid of the neighbourhood; false where it is
+// degenerate.
+FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
+                  int round, int radius, LocalPlane guess, OUT(PlaneFit) fit) {
+  fit.plane = guess;
+  fit.certainty = 0.0f;
+  fit.information = vec3(0.0f, 0.0f, 0.0f);
+  ivec4 size = PARAMETERS.cameras[PASS.reference].size;
+  float inverse_scale = PARAMETERS.support.y;
+  float twice_own = 2.0f * own.x;
+  int step = max(radius / PASS.steps, 1);
+  radius = min(radius, step * PASS.steps);
+  float fall_off = 0.25f / float(radius * radius);  // of the eighth root of the Gaussian
+  // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
+  vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
+  int first_x = pixel.x - radius + int(u.x * float(step)) - step / 2;
+  int first_y = pixel.y - radius + int(u.y * float(step)) - step / 2;
+  while (first_x < 0) first_x += step;
+  while (first_y < 0) first_y += step;
+  int last_x = min(pixel.x + radius, size.x - 1);
+  int last_y = min(pixel.y + radius, size.y - 1);
+  float s = 0.0f;
+  float sx = 0.0f;
+  float sy = 0.0f;
+  float sxx = 0.0f;
+  float sxy = 0.0f;
+  float syy = 0.0f;
+  float sr = 0.0f;
+  float sxr = 0.0f;
+  float syr = 0.0f;
+  for (int qy = first_y; qy <= last_y; qy += step) {
+    float dy = float(qy - pixel.y);
+    float remoteness_of_row = 1.0f + fall_off * (dy * dy);
+    float dx = float(first_x - pixel.x);
+    for (int qx = first_x; qx <= last_x; qx += step) {
+      ivec2 q = ivec2(qx, qy);
+      vec4 measure = check_at(CONTEXT PASS.reference, q);
+      vec4 r = ray_at(CONTEXT PASS.reference, q);
+      vec3 direction = vec3(r.x, r.y, r.z);
+      float x = dot(direction, east);
+      float y = dot(direction, south);
+      float z = dot(direction, ray);
+      float residual = measure.z - guess.offset * z - guess.slope_x * x - guess.slope_y * y;
+      float displacement = residual * measure.y;
+      // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own. Everything that
+      // weighs shares one division.
+      float scale2 = min(2.0f * measure.x + twice_own, 2.0f * LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      float doubt = scale2 + displacement * displacement;
+      float remoteness = remoteness_of_row + fall_off * (dx * dx);
+      float unlikeness = eighth_of_unlikeness(measure.w, own.w, inverse_scale);
+      float trust = measure.y * scale2;
+      float weight = trust * trust * (1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness)));
+      if (measure.x >= UNMEASURED_VARIANCE) weight = 0.0f;
+      float zw = weight * z;
+      float xw = weight * x;
+      float yw = weight * y;
+      s += zw * z;
+      sx += zw * x;
+      sy += zw * y;
+      sxx += xw * x;
+      sxy += xw * y;
+      syy += yw * y;
+      sr += zw * residual;
+      sxr += xw * residual;
+      syr += yw * residual;
+      dx += float(step);
+    }
+  }
+  fit.certainty = s * float(step * step);
+  if (!(s > 0.0f)) return false;
+  float mx = sx / s;
+  float my = sy / s;
+  // A weak pull towards the guess decides slopes that the neighbourhood leaves open.
+  float pull = 1e-3f * s;
+  float cxx = sxx - sx * mx + pull;
+  float cxy = sxy - sx * my;
+  float cyy = syy - sy * my + pull;
+  float cxr = sxr - sr * mx;
+  float cyr = syr - sr * my;
+  float determinant = cxx * cyy - cxy * cxy;
+  if (!(determinant > 1e-9f * cxx * cyy)) return false;
+  fit.information = vec3(cxx, cxy, cyy);
+  float turn_x = (cyy * cxr - cxy * cyr) / determinant;
+  float turn_y = (cxx * cyr - cxy * cxr) / determinant;
+  fit.plane.slope_x = guess.slope_x + turn_x;
+  fit.plane.slope_y = guess.slope_y + turn_y;
+  fit.plane.offset = guess.offset + sr / s - turn_x * mx - turn_y * my;
+  return true;
+}
