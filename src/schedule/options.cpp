@@ -65,7 +65,7 @@ Options Options::preset_named(const std::string& name) {
     options.sweep_steps = 128;
     options.level_iterations = {4, 3, 2};
     options.regression_radius = 64;
-    options.regression_steps = 6;
+    options.regression_steps = 8;
     options.ambiguity_margin = 0.2;
     return options;
   }
