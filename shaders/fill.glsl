@@ -26,27 +26,30 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int dy = i / 3 - 1;
     if (dx == 0 && dy == 0) continue;
     int reach = dx == 0 || dy == 0 ? PASS.radius : PASS.radius * 7 / 10;
-    for (int k = 1; k <= reach; ++k) {
-      ivec2 q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
+    // The nearest accepted one first, what is done with it after the loop: software devices would do it every step.
+    ivec2 q = pixel;
+    bool accepted = false;
+    for (int k = 1; k <= reach && !accepted; ++k) {
+      q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
       if (!in_image(size, q)) break;
-      if (check_at(CONTEXT PASS.reference, q).w != 0.0f) continue;
-      vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
-      vec3 m = vec3(held.x, held.y, held.z);
-      if (!admissible(CONTEXT ray, m)) break;
-      float weight =
-          1.0f / eighth_power(eighth_of_unlikeness(intensity_at(CONTEXT PASS.reference, q), intensity, inverse_scale));
-      int place = count;
-      while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
-        planes[place] = planes[place - 1];
-        weights[place] = weights[place - 1];
-        --place;
-      }
-      planes[place] = m;
-      weights[place] = weight;
-      total += weight;
-      ++count;
-      break;
+      accepted = check_at(CONTEXT PASS.reference, q).w == 0.0f;
     }
+    if (!accepted) continue;
+    vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
+    vec3 m = vec3(held.x, held.y, held.z);
+    if (!admissible(CONTEXT ray, m)) continue;
+    float weight =
+        1.0f / eighth_power(eighth_of_unlikeness(intensity_at(CONTEXT PASS.reference, q), intensity, inverse_scale));
+    int place = count;
+    while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
+      planes[place] = planes[place - 1];
+      weights[place] = weights[place - 1];
+      --place;
+    }
+    planes[place] = m;
+    weights[place] = weight;
+    total += weight;
+    ++count;
   }
   vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
   if (count > 0) {
