@@ -3,12 +3,17 @@
 
 // Pixels away at which the surroundings of a pixel are taken for a normal.
 #define SURROUNDINGS_RADIUS 3
+// Share of the range of inverse distance to either side of a point over which its movement is measured, and 0.5 divided
+// by it: compilers fold a quotient of two constants and a product, each in its own way, and round otherwise.
+#define VELOCITY_STEP 0.002f
+#define HALF_PER_VELOCITY_STEP 249.999985f
 
 // Movement in the source, pixels per unit of inverse distance; zero where it cannot be measured.
 FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
-  float step = 0.002f * (PARAMETERS.range.w - PARAMETERS.range.z);
+  float range = PARAMETERS.range.w - PARAMETERS.range.z;
+  float step = VELOCITY_STEP * range;
   vec2 low;
   vec2 high;
   int model = model_of(CONTEXT camera);
@@ -16,7 +21,7 @@ FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
       !project(camera, model, direction_in_source(pair, ray, w + step), high)) {
     return vec2(0.0f, 0.0f);
   }
-  return (0.5f / step) * (high - low);
+  return (HALF_PER_VELOCITY_STEP / range) * (high - low);
 }
 
 // The source that tells most about the pixel's distance, and the movement there: of those that see the point the

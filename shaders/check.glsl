@@ -5,6 +5,9 @@
 // The surroundings of a pixel: a sparse grid of this radius and step.
 #define SUPPORT_RADIUS 20
 #define SUPPORT_STEP 4
+// Share of the range of inverse distance over which a point's speed is measured, and its inverse (see VELOCITY_STEP).
+#define SPEED_STEP 0.01f
+#define PER_SPEED_STEP 100.0f
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
 // Of the surroundings' mean squared correlation: from a tenth on, their planes count as known from the images.
@@ -33,14 +36,15 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
 FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   ViewPair pair = pair_between(CONTEXT PASS.reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
-  float step = 0.01f * (PARAMETERS.range.w - PARAMETERS.range.z);
+  float range = PARAMETERS.range.w - PARAMETERS.range.z;
+  float step = SPEED_STEP * range;
   if (w + step > PARAMETERS.range.w) step = -step;
   vec2 here;
   vec2 there;
   int model = model_of(CONTEXT camera);
   if (!project(camera, model, direction_in_source(pair, ray, w), here)) return 0.0f;
   if (!project(camera, model, direction_in_source(pair, ray, w + step), there)) return 0.0f;
-  return length(there - here) / abs(step);
+  return length(there - here) * (PER_SPEED_STEP / range);
 }
 
 // In the source where it is fastest.
@@ -52,8 +56,8 @@ FN float speed_in_sources(CONTEXT_ARGUMENT vec3 ray, float w) {
   return speed;
 }
 
-// Of the surrounding planes: the share that puts the pixel's point where its own does (x) and the mean of their
-// squared correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
+// Of the surrounding planes: the share that puts the pixel's point where its own does (x) and EVIDENCE_SCALE times the
+// mean of their squared correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
 FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
   float planes = 0.0f;
   float supporting = 0.0f;
@@ -72,7 +76,8 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
     }
   }
   float share = 1.0f / max(planes, 1.0f);
-  return vec2(supporting * share, evidence * share);
+  // Scaled first: of a product with a constant Mesa takes the first factor with it.
+  return vec2(supporting * share, (EVIDENCE_SCALE * evidence) * share);
 }
 
 // Whether the patch matches better by more than the margin at one of PASS.places places: 2, 4, 8 ... source
@@ -98,7 +103,7 @@ FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float sp
 FN float confidence_of(float displacement, float support, float unexplained, float evidence) {
   float log_odds = 1.41f - 0.48f * logarithm(1.0f + 4.0f * displacement) + 1.44f * logarithm(support + 0.02f) -
                    0.31f * logarithm(unexplained + 1.5e-5f);
-  return min(EVIDENCE_SCALE * evidence, 1.0f) / (1.0f + exponential(-log_odds));
+  return min(evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {

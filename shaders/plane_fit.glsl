@@ -55,7 +55,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float syr = 0.0f;
   for (int qy = first_y; qy <= last_y; qy += step) {
     float dy = float(qy - pixel.y);
-    float remoteness_of_row = 1.0f + fall_off * (dy * dy);
+    float squared_dy = dy * dy;
     float dx = float(first_x - pixel.x);
     for (int qx = first_x; qx <= last_x; qx += step) {
       ivec2 q = ivec2(qx, qy);
@@ -71,7 +71,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       // weighs shares one division.
       float scale2 = min(2.0f * measure.x + twice_own, 2.0f * LARGEST_RESIDUAL * LARGEST_RESIDUAL);
       float doubt = scale2 + displacement * displacement;
-      float remoteness = remoteness_of_row + fall_off * (dx * dx);
+      float remoteness = 1.0f + fall_off * (squared_dy + dx * dx);
       float unlikeness = eighth_of_unlikeness(measure.w, own.w, inverse_scale);
       float trust = measure.y * scale2;
       float weight = trust * trust * (1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness)));

@@ -19,8 +19,8 @@ PatchOperations patch_operations(const KernelConstants& constants);
 
 /// Those of shaders/plane_fit.glsl, counted likewise.
 struct FitOperations {
-  int of_neighbour = 66;  ///< in the loop over a row of neighbours
-  int of_row = 3;
+  int of_neighbour = 67;  ///< in the loop over a row of neighbours
+  int of_row = 1;
   int of_fit = 41;  ///< around both loops, after random numbers
 };
 

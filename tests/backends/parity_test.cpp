@@ -205,6 +205,31 @@ TEST_P(Parity, ExactFilteringGivesTheBitsOfTheCpu) {
   }
 }
 
+TEST_P(Parity, AnyRangeOfDistancesGivesTheBitsOfTheCpu) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  if (const std::string why = why_bits_may_differ(*device); !why.empty()) GTEST_SKIP() << why;
+  Device cpu = Device::open("cpu");
+  const RenderedPair pair = render_demo(72);
+  std::vector<cv::Mat> images;
+  cv::RNG random(3);
+  for (const cv::Mat& image : images_of(pair)) {
+    images.push_back(image.clone());
+    // Nothing matches there.
+    random.fill(images.back().rowRange(0, 32), cv::RNG::UNIFORM, 0, 255);
+  }
+  for (const auto& [nearest, farthest] : {std::pair(0.2, 5.0), {0.5, 25.0}, {0.5, 50.0}}) {
+    SCOPED_TRACE(farthest);
+    Options options = exact(Options::preset_named("fast"));
+    options.min_distance = nearest;
+    options.max_distance = farthest;
+    const StereoResult expected = Matcher(cpu, pair.rig, options).match(images);
+    const StereoResult actual = Matcher(*device, pair.rig, options).match(images);
+    for (int view = 0; view < 2; ++view) {
+      expect_same_bits(expected.views[view], actual.views[view]);
+    }
+  }
+}
+
 /// Two cameras of the demo's room whose lens has every coefficient of the model.
 Rig rig_of_model(CameraModel model, int size) {
   Rig rig = demo_rig(size);
