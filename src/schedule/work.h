@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the kernels of a schedule have to do (see KernelWork), for comparing times with what a device
-// can do.
+// What the kernels of a schedule have to do (see KernelWork), for comparing times with what a
+// device can do.
 #pragma once
 
 #include "schedule/schedule.h"
