@@ -305,7 +305,7 @@ class Builder {
       const unsigned how =
           (last ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN) | (i > 0 ? HELD_UNSEEN : 0);
       for (const int view : views_of(0)) {
-        regress(view, 0, precision_of_round(i), how);
+        regress(view, 0, precision_of_round(i), how, warm_regression_steps());
       }
     }
     repair();
@@ -389,8 +389,19 @@ class Builder {
     add_with_patches(Kernel::measure, pass, view, (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
   }
 
+  /// Planes that were regressed in the frame before need fewer neighbours.
+  int warm_regression_steps() const {
+    constexpr int fewest = 3;
+    return std::max(std::min(options_.regression_steps, fewest), options_.regression_steps / 2);
+  }
+
   /// The view must have been measured. `precision`: 0 leaves the distances as they are.
   void regress(int view, int level, double precision, unsigned how) {
+    regress(view, level, precision, how, options_.regression_steps);
+  }
+
+  /// `steps`: of the grid of neighbours.
+  void regress(int view, int level, double precision, unsigned how, int steps) {
     kernel::PassParameters pass = pass_of(view);
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
@@ -398,7 +409,7 @@ class Builder {
     pass.radius =
         level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
     if (precision == 0) pass.radius *= 4;
-    pass.steps = options_.regression_steps;
+    pass.steps = steps;
     pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
     add(Kernel::regress, pass, view, 0);
