@@ -217,9 +217,8 @@ FN int first_column(CONTEXT_ARGUMENT int radius, int row) {
   return -radius + (PATTERN == PATTERN_CHECKERBOARD ? (radius + row) & 1 : 0);
 }
 
-// About exp(a) for a >= 0 with the same bits everywhere (elementary.glsl): the 8th power of this. A sum's is that of
-// the product.
-FN float eighth_of_growth(float a) { return 1.0f + 0.125f * a; }
+// The eighth root of growth(); of a sum it is about the product of both.
+FN float root_of_growth(float a) { return 1.0f + 0.125f * a; }
 
 FN float eighth_power(float t) {
   t = t * t;
@@ -227,11 +226,12 @@ FN float eighth_power(float t) {
   return t * t;
 }
 
-FN float growth(float a) { return eighth_power(eighth_of_growth(a)); }
+// About exp(a) for a >= 0, with the same bits everywhere (elementary.glsl).
+FN float growth(float a) { return eighth_power(root_of_growth(a)); }
 
-// From 1 on, how unlike two intensities of the reference are: pixels of one surface mostly are alike; the eighth root
-// of it. `inverse_scale`: PARAMETERS.support.y, which loops read once.
-FN float eighth_of_unlikeness(float a, float b, float inverse_scale) {
+// The eighth root of how unlike two intensities of the reference are, from 1 on: pixels of one surface mostly are
+// alike. `inverse_scale`: PARAMETERS.support.y, which loops read once.
+FN float root_of_unlikeness(float a, float b, float inverse_scale) {
   return 1.0f + (0.125f * inverse_scale) * abs(a - b);
 }
 
