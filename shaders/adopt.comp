@@ -13,10 +13,6 @@
 #include "random.glsl"
 #include "patch.glsl"
 #include "search.glsl"
-#include "pyramid.glsl"
-#include "adaptive_search.glsl"
-#include "consistency.glsl"
-#include "measure.glsl"
 #include "plane_fit.glsl"
 #include "regression.glsl"
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 // How precisely each pixel's plane was matched, which the plane regression weighs by.
 
-// Variance (px^2) of what was not measured.
-#define UNMEASURED_VARIANCE 1e4f
-// Variance below which no measurement is believed.
+// Variance (px^2) below which no measurement is believed.
 #define SMALLEST_VARIANCE 4e-4f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f

@@ -75,6 +75,12 @@
 #define ADOPT_UNSEEN 2u
 #define HELD_UNSEEN 4u
 
+// Of the plane regression: the round, from 0 on, that first asks a whole neighbourhood, each before it half the next
+// one; the smallest radius (pixels) that a plane is fitted to; the variance (px^2) of what was not measured.
+#define WHOLE_RADIUS_ROUND 3
+#define SMALLEST_FIT_RADIUS 2
+#define UNMEASURED_VARIANCE 1e4f
+
 // X_source ~ rotation . ray + translation . (m . ray); rows of [R | t].
 struct ViewPair {
   vec4 row0;

@@ -33,6 +33,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   ivec4 size = PARAMETERS.cameras[PASS.reference].size;
   float inverse_scale = PARAMETERS.support.y;
   float twice_own = 2.0f * own.x;
+  radius = max(radius, SMALLEST_FIT_RADIUS);
   int step = max(radius / PASS.steps, 1);
   radius = min(radius, step * PASS.steps);
   float fall_off = 0.25f / float(radius * radius);  // of the eighth root of the Gaussian

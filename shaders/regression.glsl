@@ -4,7 +4,6 @@
 
 // Rounds for distances, the last two over the whole radius, the others over an eighth, a quarter and a half of it.
 #define REGRESSION_ROUNDS 5
-#define WHOLE_RADIUS_ROUND 3
 // Rounds for normals alone: over an eighth, twice a half, and the whole radius.
 #define NORMAL_ROUNDS 4
 // Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
@@ -21,7 +20,7 @@ FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 so
   for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
     // What has its offset needs but one more round for its slopes.
     if (determined && round < REGRESSION_ROUNDS - 1) continue;
-    int radius = max(PASS.radius >> max(WHOLE_RADIUS_ROUND - round, 0), 2);
+    int radius = PASS.radius >> max(WHOLE_RADIUS_ROUND - round, 0);
     PlaneFit fit;
     if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
     plane = fit.plane;
@@ -42,9 +41,10 @@ FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 s
   float offset = plane.offset;
   PlaneFit first;
   for (int round = 0; round < NORMAL_ROUNDS; ++round) {
-    int radius = round == 0 ? PASS.radius / 8 : (round < NORMAL_ROUNDS - 1 ? PASS.radius / 2 : PASS.radius);
+    int radius = round == 0 ? PASS.radius >> WHOLE_RADIUS_ROUND
+                            : (round < NORMAL_ROUNDS - 1 ? PASS.radius / 2 : PASS.radius);
     PlaneFit fit;
-    if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, max(radius, 2), plane, fit)) continue;
+    if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
     if (!found) first = fit;
     float x = fit.plane.slope_x - first.plane.slope_x;
     float y = fit.plane.slope_y - first.plane.slope_y;

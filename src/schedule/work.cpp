@@ -165,7 +165,7 @@ double regression_operations(const Dispatch& dispatch) {
   const kernel::PassParameters& pass = dispatch.pass;
   const bool normals = pass.deviation == 0 || (pass.candidates & REGRESS_NORMALS) != 0;
   const FitOperations operations;
-  const int side = side_of_fit(std::max(pass.radius / 8, 2), pass.steps);
+  const int side = side_of_fit(pass.radius >> WHOLE_RADIUS_ROUND, pass.steps);
   return (normals ? 2 : 1) *
          (operations.of_fit + side * (operations.of_row + side * operations.of_neighbour));
 }
@@ -197,6 +197,7 @@ PatchOperations patch_operations(const KernelConstants& c) {
 }
 
 int side_of_fit(int radius, int steps) {
+  radius = std::max(radius, SMALLEST_FIT_RADIUS);
   const int step = std::max(radius / steps, 1);
   return 2 * std::min(radius / step, steps) + 1;
 }

@@ -85,6 +85,11 @@ struct Context {
   kernel::cpu::Context plain;
 };
 
+inline Context context_of(KernelFixture& fixture) {
+  return {numbers<MatchParameters>(fixture.schedule().parameters),
+          numbers<PassParameters>(fixture.pass()), fixture.schedule().constants, fixture.context()};
+}
+
 inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return numbers<vec4>(kernel::cpu::ray_at(context.plain, view, p));
 }

@@ -28,10 +28,7 @@ counting::Counts run_patch(const Options& options, CameraModel model) {
   for (View& view : rig.views) view.camera = camera_of(model);
   KernelFixture fixture(rig, options);
   fixture.set_reference(0);
-  const counting::Context context{
-      counting::numbers<counting::MatchParameters>(fixture.schedule().parameters),
-      counting::numbers<counting::PassParameters>(fixture.pass()), fixture.schedule().constants,
-      fixture.context()};
+  const counting::Context context = counting::context_of(fixture);
   counting::counts = {};
   const counting::Number cost =
       counting::source_cost(context, 1, {48, 49}, counting::vec3(0.1f, 0.05f, 0.4f));
@@ -72,13 +69,10 @@ TEST(Work, OfAPlaneFitIsWhatRunningItTakes) {
   KernelFixture fixture(fisheye_rig(96), Options::preset_named("fast"));
   fixture.set_reference(0);
   fixture.view(0).checks.setTo(cv::Scalar(0.01, 3, 0.5, 0.5));
-  for (const auto& [radius, steps] : {std::pair(3, 4), std::pair(5, 4), std::pair(12, 6)}) {
+  for (const auto& [radius, steps] : {std::pair(1, 4), std::pair(5, 4), std::pair(12, 6)}) {
     SCOPED_TRACE(radius);
     fixture.pass().steps = steps;
-    const counting::Context context{
-        counting::numbers<counting::MatchParameters>(fixture.schedule().parameters),
-        counting::numbers<counting::PassParameters>(fixture.pass()), fixture.schedule().constants,
-        fixture.context()};
+    const counting::Context context = counting::context_of(fixture);
     const counting::vec3 ray(0, 0, 1), east(TANGENT_SCALE, 0, 0), south(0, TANGENT_SCALE, 0);
     const counting::LocalPlane guess{0.5f, 0.0f, 0.0f};
     counting::PlaneFit fit;
