@@ -10,7 +10,7 @@
 
 // Movement in the source, pixels per unit of inverse distance; zero where it cannot be measured.
 FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   float range = PARAMETERS.range.w - PARAMETERS.range.z;
   float step = VELOCITY_STEP * range;
@@ -60,8 +60,8 @@ FN vec3 best_of_strip(CONTEXT_ARGUMENT ivec2 pixel, int strip) {
     if (side == STRIP_UP || side == STRIP_LEFT) along = -along;
     ivec2 q = side == STRIP_UP || side == STRIP_DOWN ? ivec2(pixel.x + across, pixel.y + along)
                                                      : ivec2(pixel.x + along, pixel.y + across);
-    if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
-    vec4 candidate = hypothesis_at(CONTEXT PASS.reference, q);
+    if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) continue;
+    vec4 candidate = hypothesis_at(CONTEXT REFERENCE, q);
     if (candidate.w < lowest) {
       lowest = candidate.w;
       best = vec3(candidate.x, candidate.y, candidate.z);
@@ -86,9 +86,9 @@ FN vec3 surroundings_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) {
   for (int i = 0; i < 4; ++i) {
     int offset = (i & 1) == 0 ? -SURROUNDINGS_RADIUS : SURROUNDINGS_RADIUS;
     ivec2 q = i < 2 ? ivec2(pixel.x + offset, pixel.y) : ivec2(pixel.x, pixel.y + offset);
-    if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) return none;
-    vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
-    vec4 r = ray_at(CONTEXT PASS.reference, q);
+    if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) return none;
+    vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
+    vec4 r = ray_at(CONTEXT REFERENCE, q);
     vec3 direction = vec3(r.x, r.y, r.z);
     float w = inverse_distance_of(plane, direction);
     if (w <= 0.0f) return none;
@@ -105,7 +105,7 @@ FN vec3 source_plane(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m) {
   vec3 none = vec3(0.0f, 0.0f, 0.0f);
   vec4 held = hypothesis_in_source(CONTEXT source, ray, m);
   vec3 plane = vec3(held.x, held.y, held.z);
-  ViewPair back = pair_between(CONTEXT source, PASS.reference);
+  ViewPair back = pair_between(CONTEXT source, REFERENCE);
   if (held.w >= INVALID_COST || side_of_source(back, plane) <= 0.0f) return none;
   return plane_in_source(back, plane);
 }
@@ -132,8 +132,8 @@ FN vec3 adaptive_candidate(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float
 }
 
 FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   float w = inverse_distance_of(held, ray);
   if (!is_usable(CONTEXT pixel, usable_ray)) return;
@@ -148,5 +148,5 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
                      adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind),
                      1.0f / max(speed, 1e-6f));
   }
-  store_hypothesis(CONTEXT PASS.reference, pixel, held);
+  store_hypothesis(CONTEXT REFERENCE, pixel, held);
 }

@@ -19,5 +19,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) adopt_fill_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) adopt_fill_pixel(pixel);
 }

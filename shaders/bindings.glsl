@@ -47,18 +47,20 @@ layout(push_constant) uniform PassBlock {
 #endif
 };
 
-// Of the view whose pixels are updated, read once: lavapipe reads blocks lane by lane, in loops each time anew.
-ivec4 map_place_of_reference = map_places[pass.reference];
-ivec4 intensity_place_of_reference = intensity_places[pass.reference];
+#define VIEW_OF_LAUNCH int(gl_WorkGroupID.z)
 
-ivec4 map_place(int view) { return view == pass.reference ? map_place_of_reference : map_places[view]; }
+// Of the view whose pixels are updated, read once: lavapipe reads blocks lane by lane, in loops each time anew.
+ivec4 map_place_of_reference = map_places[REFERENCE];
+ivec4 intensity_place_of_reference = intensity_places[REFERENCE];
+
+ivec4 map_place(int view) { return view == REFERENCE ? map_place_of_reference : map_places[view]; }
 
 ivec3 in_maps(int view, ivec2 p) { return map_place(view).xyz + ivec3(p, 0); }
 
 ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_place(view).w); }
 
 ivec3 in_intensities(int view, ivec2 p) {
-  ivec4 place = view == pass.reference ? intensity_place_of_reference : intensity_places[view];
+  ivec4 place = view == REFERENCE ? intensity_place_of_reference : intensity_places[view];
   return place.xyz + ivec3(p, 0);
 }
 
@@ -120,7 +122,7 @@ vec4 check_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(
 
 void store_check(int view, ivec2 p, vec4 c) { imageStore(hypotheses, in_further_maps(2, view, p), c); }
 
-int transfer_index(ivec2 p) { return p.y * parameters.cameras[pass.reference].size.x + p.x; }
+int transfer_index(ivec2 p) { return p.y * parameters.cameras[REFERENCE].size.x + p.x; }
 
 void transfer_reset(ivec2 p) {
   transfer_nearest[transfer_index(p)] = 0u;
@@ -144,5 +146,6 @@ bool thread_pixel(int view, out ivec2 pixel) {
   pixel = ivec2(gl_GlobalInvocationID.xy);
   pixel.y += pass.first_row;
   if (pass.colour >= 0) pixel.x = 2 * pixel.x + ((pixel.y + pass.colour) & 1);
-  return pixel.x < parameters.cameras[view].size.x && pixel.y < pass.last_row;
+  ivec4 size = parameters.cameras[view].size;
+  return pixel.x < size.x && pixel.y < min(pass.last_row, size.y);
 }

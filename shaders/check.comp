@@ -16,5 +16,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) check_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) check_pixel(pixel);
 }

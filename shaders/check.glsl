@@ -15,13 +15,13 @@
 
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
-  float centre = intensity_at(CONTEXT PASS.reference, pixel);
+  float centre = intensity_at(CONTEXT REFERENCE, pixel);
   float n = 0.0f;
   float sum = 0.0f;
   float sum_squares = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
     for (int dx = -WINDOW_RADIUS; dx <= WINDOW_RADIUS; ++dx) {
-      float a = intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + dx, pixel.y + dy));
+      float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
       if (a < 0.0f) continue;
       a -= centre;
       n += 1.0f;
@@ -34,7 +34,7 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
 
 // Source pixels that the point moves per unit of inverse distance, at its own. Zero at an epipole.
 FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   float range = PARAMETERS.range.w - PARAMETERS.range.z;
   float step = SPEED_STEP * range;
@@ -65,8 +65,8 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   for (int dy = -SUPPORT_RADIUS; dy <= SUPPORT_RADIUS; dy += SUPPORT_STEP) {
     for (int dx = -SUPPORT_RADIUS; dx <= SUPPORT_RADIUS; dx += SUPPORT_STEP) {
       ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      if ((dx == 0 && dy == 0) || !in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
-      vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+      if ((dx == 0 && dy == 0) || !in_image(PARAMETERS.cameras[REFERENCE].size, q)) continue;
+      vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
       if (plane.w >= INVALID_COST) continue;
       planes += 1.0f;
       float correlation = max(1.0f - plane.w, 0.0f);
@@ -107,9 +107,9 @@ FN float confidence_of(float displacement, float support, float unexplained, flo
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec3 m = vec3(held.x, held.y, held.z);
   vec2 difference = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
   float confidence = 0.0f;
@@ -143,5 +143,5 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
                                variance * min(held.w, 1.0f), support.y);
   }
-  store_check(CONTEXT PASS.reference, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
+  store_check(CONTEXT REFERENCE, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
 }

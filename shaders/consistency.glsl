@@ -10,7 +10,7 @@
 // where the source's own plane puts it; UNKNOWN_DIFFERENCE where the source has no plane there.
 FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec3 m) {
   vec2 unknown = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   vec4 other = hypothesis_in_source(CONTEXT source, ray, m);
   if (other.w >= INVALID_COST) return unknown;
 
@@ -22,7 +22,7 @@ FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ra
   float relative = abs(w / w_source - 1.0f);
   vec3 back = rotate_back(pair, direction - w_source * translation(pair));
   vec2 reprojected;
-  CameraParameters reference_camera = PARAMETERS.cameras[PASS.reference];
+  CameraParameters reference_camera = PARAMETERS.cameras[REFERENCE];
   if (!project(reference_camera, model_of(CONTEXT reference_camera), back, reprojected)) return unknown;
   return vec2(min(relative, UNKNOWN_DIFFERENCE),
               min(length(reprojected - vec2(float(pixel.x), float(pixel.y))), UNKNOWN_DIFFERENCE));

@@ -17,5 +17,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) downsample_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) downsample_pixel(pixel);
 }

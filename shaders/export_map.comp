@@ -17,12 +17,12 @@ layout(set = 1, binding = 0, std430) writeonly buffer MapBlock { uint map_words[
 
 void main() {
   ivec2 pixel;
-  if (!thread_pixel(pass.reference, pixel)) return;
+  if (!thread_pixel(REFERENCE, pixel)) return;
   uint row = conversion.first + uint(pixel.y) * conversion.pitch;
   uint x = uint(pixel.x);
-  vec4 hypothesis = hypothesis_at(pass.reference, pixel);
-  float distance = plane_distance(hypothesis, ray_at(pass.reference, pixel));
-  vec4 checked = check_at(pass.reference, pixel);
+  vec4 hypothesis = hypothesis_at(REFERENCE, pixel);
+  float distance = plane_distance(hypothesis, ray_at(REFERENCE, pixel));
+  vec4 checked = check_at(REFERENCE, pixel);
   if (conversion.kind == MAP_NORMALS) {
     vec3 normal = vec3(0.0f, 0.0f, 0.0f);
     if (distance > 0.0f) normal = plane_normal(hypothesis);

@@ -10,16 +10,16 @@
 // Stores as prior (m, 1) the plane that the pixel would take over, zero where there is none: the median of the
 // surface at the FAR_SHARE of the planes around, both weighted by likeness of intensity.
 FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  float intensity = intensity_at(CONTEXT PASS.reference, pixel);
+  float intensity = intensity_at(CONTEXT REFERENCE, pixel);
   float inverse_scale = PARAMETERS.support.y;
-  ivec4 size = PARAMETERS.cameras[PASS.reference].size;
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   vec3 planes[8];
   float weights[8];
   int count = 0;
   float total = 0.0f;
-  uint reasons = uint(check_at(CONTEXT PASS.reference, pixel).w);
+  uint reasons = uint(check_at(CONTEXT REFERENCE, pixel).w);
   bool wanted = reasons != 0u && (reasons & PASS.candidates) == 0u;
   for (int i = 0; i < 9 && wanted; ++i) {
     int dx = i % 3 - 1;
@@ -32,14 +32,14 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int k = 1; k <= reach && !accepted; ++k) {
       q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
       if (!in_image(size, q)) break;
-      accepted = check_at(CONTEXT PASS.reference, q).w == 0.0f;
+      accepted = check_at(CONTEXT REFERENCE, q).w == 0.0f;
     }
     if (!accepted) continue;
-    vec4 held = hypothesis_at(CONTEXT PASS.reference, q);
+    vec4 held = hypothesis_at(CONTEXT REFERENCE, q);
     vec3 m = vec3(held.x, held.y, held.z);
     if (!admissible(CONTEXT ray, m)) continue;
     float weight =
-        1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT PASS.reference, q), intensity, inverse_scale));
+        1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q), intensity, inverse_scale));
     int place = count;
     while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
       planes[place] = planes[place - 1];
@@ -68,17 +68,17 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     while (sum < 0.5f * of_surface && chosen + 1 < end) sum += weights[++chosen];
     prior = vec4(planes[chosen], 1.0f);
   }
-  store_prior(CONTEXT PASS.reference, pixel, prior);
+  store_prior(CONTEXT REFERENCE, pixel, prior);
 }
 
 // Takes the plane over, with the cost of no information where the source does not see it, and marks the pixel.
 FN void adopt_fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
+  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   if (prior.w == 0.0f) return;
   vec3 m = vec3(prior.x, prior.y, prior.z);
-  store_hypothesis(CONTEXT PASS.reference, pixel,
+  store_hypothesis(CONTEXT REFERENCE, pixel,
                    vec4(m, min(patch_cost(CONTEXT pixel, m), NO_INFORMATION_COST)));
-  vec4 checked = check_at(CONTEXT PASS.reference, pixel);
-  store_check(CONTEXT PASS.reference, pixel,
+  vec4 checked = check_at(CONTEXT REFERENCE, pixel);
+  store_check(CONTEXT REFERENCE, pixel,
               vec4(checked.x, checked.y, 0.0f, checked.w + float(REASON_FILLED)));
 }

@@ -28,7 +28,7 @@ float imported(ivec2 pixel) {
 
 void main() {
   ivec2 pixel;
-  if (!thread_pixel(pass.reference, pixel)) return;
-  bool usable = ray_at(pass.reference, pixel).w != 0.0f;
-  store_intensity(pass.reference, pixel, usable ? imported(pixel) : MASKED_INTENSITY);
+  if (!thread_pixel(REFERENCE, pixel)) return;
+  bool usable = ray_at(REFERENCE, pixel).w != 0.0f;
+  store_intensity(REFERENCE, pixel, usable ? imported(pixel) : MASKED_INTENSITY);
 }

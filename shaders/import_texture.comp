@@ -23,9 +23,9 @@ float imported(ivec2 pixel) {
 
 void main() {
   ivec2 pixel;
-  if (!thread_pixel(pass.reference, pixel)) return;
+  if (!thread_pixel(REFERENCE, pixel)) return;
   // Nobody can tell the size of an image view before.
   bool inside = all(lessThan(pixel, textureSize(image, 0)));
-  bool usable = inside && ray_at(pass.reference, pixel).w != 0.0f;
-  store_intensity(pass.reference, pixel, usable ? imported(pixel) : MASKED_INTENSITY);
+  bool usable = inside && ray_at(REFERENCE, pixel).w != 0.0f;
+  store_intensity(REFERENCE, pixel, usable ? imported(pixel) : MASKED_INTENSITY);
 }

@@ -13,5 +13,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) interpolate_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) interpolate_pixel(pixel);
 }

@@ -15,10 +15,10 @@ FN float intensity_between(CONTEXT_ARGUMENT float before, float a, float b, floa
 
 // Halfway between a pixel and its right neighbour.
 FN float intensity_right_of(CONTEXT_ARGUMENT ivec2 pixel) {
-  return intensity_between(CONTEXT intensity_at(CONTEXT PASS.reference, ivec2(pixel.x - 1, pixel.y)),
-                           intensity_at(CONTEXT PASS.reference, pixel),
-                           intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + 1, pixel.y)),
-                           intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + 2, pixel.y)));
+  return intensity_between(CONTEXT intensity_at(CONTEXT REFERENCE, ivec2(pixel.x - 1, pixel.y)),
+                           intensity_at(CONTEXT REFERENCE, pixel),
+                           intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + 1, pixel.y)),
+                           intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + 2, pixel.y)));
 }
 
 // A pixel's own half pixel and those to the right, below and between, each with its neighbours that a sample reads.
@@ -29,7 +29,7 @@ FN void interpolate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float down[4];
     UNROLL for (int i = 0; i < 4; ++i) {
       ivec2 q = ivec2(pixel.x + column / 2, pixel.y + i - 1);
-      down[i] = column == 1 ? intensity_right_of(CONTEXT q) : intensity_at(CONTEXT PASS.reference, q);
+      down[i] = column == 1 ? intensity_right_of(CONTEXT q) : intensity_at(CONTEXT REFERENCE, q);
     }
     texels[column] = down[1];
     texels[3 + column] = intensity_between(CONTEXT down[0], down[1], down[2], down[3]);
@@ -38,7 +38,7 @@ FN void interpolate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   UNROLL for (int row = 0; row < 2; ++row) {
     UNROLL for (int column = 0; column < 2; ++column) {
       int first = 3 * row + column;
-      store_half_pixel(CONTEXT PASS.reference, ivec2(2 * pixel.x + column, 2 * pixel.y + row),
+      store_half_pixel(CONTEXT REFERENCE, ivec2(2 * pixel.x + column, 2 * pixel.y + row),
                        vec4(texels[first], texels[first + 1], texels[first + 3], texels[first + 4]));
     }
   }

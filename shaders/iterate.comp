@@ -16,5 +16,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) iterate_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) iterate_pixel(pixel);
 }

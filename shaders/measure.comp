@@ -20,5 +20,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) measure_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) measure_pixel(pixel);
 }

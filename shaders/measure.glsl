@@ -15,7 +15,7 @@
 // Direction in the reference image, per pixel of displacement along `along` (unit) in the source: the inverse of
 // the map's derivative at the pixel; `along` itself where the derivative cannot be measured.
 FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 along) {
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   vec2 left;
@@ -37,10 +37,10 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
 
 // Change of the reference's intensity at q per pixel of displacement in the source; false where it is not seen.
 FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) slope) {
-  float left = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x - 1, 2 * q.y));
-  float right = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x + 1, 2 * q.y));
-  float up = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x, 2 * q.y - 1));
-  float down = half_pixel_at(CONTEXT PASS.reference, ivec2(2 * q.x, 2 * q.y + 1));
+  float left = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x - 1, 2 * q.y));
+  float right = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x + 1, 2 * q.y));
+  float up = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x, 2 * q.y - 1));
+  float down = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x, 2 * q.y + 1));
   slope = (right - left) * direction.x + (down - up) * direction.y;
   return min(min(left, right), min(up, down)) >= 0.0f;
 }
@@ -48,7 +48,7 @@ FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) slope) {
 // How far (px, along the source's curve) the plane's patch lies from where it matches best, by one step of least
 // squares: the source's intensities are gain (a + shift slope) + offset. Zero where that tells nothing.
 FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 direction) {
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   PatchStart start;
@@ -68,7 +68,7 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
     RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
     for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
-      float a = intensity_at(CONTEXT PASS.reference, q);
+      float a = intensity_at(CONTEXT REFERENCE, q);
       float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
       float slope;
       if (!slope_at(CONTEXT q, direction, slope) || min(a, b) < 0.0f) continue;
@@ -108,12 +108,12 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
 // source's own plane, which exposes what the patch itself cannot tell. With SUBPIXEL_MATCH the inverse distance is
 // where the patch matches best instead of where the search has left it.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = vec3(held.x, held.y, held.z);
   float correlation = 1.0f - held.w;
-  float centre = intensity_at(CONTEXT PASS.reference, pixel);
+  float centre = intensity_at(CONTEXT REFERENCE, pixel);
   float speed = 0.0f;
   float variance = UNMEASURED_VARIANCE;
   float w = inverse_distance_of(held, ray);
@@ -131,7 +131,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
       for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-        float a = intensity_at(CONTEXT PASS.reference, q);
+        float a = intensity_at(CONTEXT REFERENCE, q);
         float slope;
         if (!slope_at(CONTEXT q, direction, slope) || a < 0.0f) continue;
         a -= centre;
@@ -159,5 +159,5 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       }
     }
   }
-  store_check(CONTEXT PASS.reference, pixel, vec4(variance, speed, w, centre));
+  store_check(CONTEXT REFERENCE, pixel, vec4(variance, speed, w, centre));
 }

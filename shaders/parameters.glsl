@@ -106,15 +106,15 @@ struct MatchParameters {
 
 // Push constants.
 struct PassParameters {
-  int reference;   // view whose pixels are updated
+  int reference;   // view whose pixels are updated; of a launch over several views the first, others follow
   int first_view;  // of the level: its views follow each other; all but the reference are sources
-  int other;       // the one view that a transfer or a change of level reads from
+  int other;       // the one view that a transfer or a change of level reads from, likewise
   int iteration;   // counts over the whole schedule of this view
   int colour;      // 0, 1: checkerboard; -1: all pixels
   int neighbours;  // bits: left, right, up, down
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
-  int last_row;    // one past the last
+  int last_row;    // one past the last, which a view that is lower than others does not reach
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
                     // measuring: SUBPIXEL_MATCH; regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN, HELD_UNSEEN;
                     // filling: reasons not to fill

@@ -10,7 +10,7 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
 
 // Whether the reference has a ray and an intensity there.
 FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
-  return ray.w != 0.0f && intensity_at(CONTEXT PASS.reference, pixel) >= 0.0f;
+  return ray.w != 0.0f && intensity_at(CONTEXT REFERENCE, pixel) >= 0.0f;
 }
 
 // Where a position (pixels) lies in what sample_image() reads: in half pixels.
@@ -49,15 +49,15 @@ FN bool warp_ray(ViewPair pair, CameraParameters camera, int model, vec3 m, vec3
 FN bool warp_pixel(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, vec3 m,
                    ivec2 pixel, OUT(vec2) position) {
   position = vec2(0.0f, 0.0f);
-  if (!in_image(PARAMETERS.cameras[PASS.reference].size, pixel)) return false;
-  vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+  if (!in_image(PARAMETERS.cameras[REFERENCE].size, pixel)) return false;
+  vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
   if (dot(vec3(ray.x, ray.y, ray.z), vec3(ray.x, ray.y, ray.z)) == 0.0f) return false;
   return warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position);
 }
 
 // The pixel of the source in which the point lands; false where it lands outside.
 FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2) q) {
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
   q = ivec2(0, 0);
@@ -159,7 +159,7 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   vec2 centre;
   if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return false;
   start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
-  start.centre_a = intensity_at(CONTEXT PASS.reference, pixel);
+  start.centre_a = intensity_at(CONTEXT REFERENCE, pixel);
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
   if (!mapped) return true;
   if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, start.map)) return false;
@@ -244,7 +244,7 @@ FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
 FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
-  int reference = PASS.reference;
+  int reference = REFERENCE;
   ViewPair pair = pair_between(CONTEXT reference, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);

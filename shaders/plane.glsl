@@ -6,7 +6,7 @@
 // that mask lanes instead of branching.
 FN int source_at(CONTEXT_ARGUMENT int i) {
   int view = PASS.first_view + i;
-  return view < PASS.reference ? view : view + 1;
+  return view < REFERENCE ? view : view + 1;
 }
 
 // Of two views of the level.

@@ -6,6 +6,9 @@
 #define LARGEST_RESIDUAL 0.6f
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
+// Pixels that share the place of their grids: those whose threads a GPU runs at once then load neighbours side by side.
+#define GRID_TILE_WIDTH 8
+#define GRID_TILE_HEIGHT 4
 // Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
 #define TANGENT_SCALE 128.0f
 
@@ -30,15 +33,16 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.plane = guess;
   fit.certainty = 0.0f;
   fit.information = vec3(0.0f, 0.0f, 0.0f);
-  ivec4 size = PARAMETERS.cameras[PASS.reference].size;
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float inverse_scale = PARAMETERS.support.y;
   float twice_own = 2.0f * own.x;
   radius = max(radius, SMALLEST_FIT_RADIUS);
   int step = max(radius / PASS.steps, 1);
   radius = min(radius, step * PASS.steps);
   float fall_off = 0.25f / float(radius * radius);  // of the eighth root of the Gaussian
-  // Every pixel's grid lies elsewhere: pixels a step apart would share theirs and none with those between.
-  vec4 u = draw4(CONTEXT pixel, REGRESSION_SLOT + round);
+  // Every tile's grids lie elsewhere: pixels a step apart would share theirs and none with those between.
+  ivec2 tile = ivec2(pixel.x / GRID_TILE_WIDTH, pixel.y / GRID_TILE_HEIGHT);
+  vec4 u = draw4(CONTEXT tile, REGRESSION_SLOT + round);
   int first_x = pixel.x - radius + int(u.x * float(step)) - step / 2;
   int first_y = pixel.y - radius + int(u.y * float(step)) - step / 2;
   while (first_x < 0) first_x += step;
@@ -60,8 +64,8 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
     float dx = float(first_x - pixel.x);
     for (int qx = first_x; qx <= last_x; qx += step) {
       ivec2 q = ivec2(qx, qy);
-      vec4 measure = check_at(CONTEXT PASS.reference, q);
-      vec4 r = ray_at(CONTEXT PASS.reference, q);
+      vec4 measure = check_at(CONTEXT REFERENCE, q);
+      vec4 r = ray_at(CONTEXT REFERENCE, q);
       vec3 direction = vec3(r.x, r.y, r.z);
       float x = dot(direction, east);
       float y = dot(direction, south);

@@ -13,7 +13,8 @@
 //                                           its centre at HALF_PIXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
 //   void  store_half_pixel(view, texel, vec4)   as half_pixel_taps() reads them, of which memories may keep the first
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
-//   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl.
+//   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl;
+//   VIEW_OF_LAUNCH                          which of the views that one launch runs over this thread has, from 0.
 #ifndef WIDESTEREO_PORTABLE_H
 #define WIDESTEREO_PORTABLE_H
 
@@ -64,5 +65,9 @@
 #include "elementary.glsl"
 
 #endif
+
+// This thread's views, of PASS.
+#define REFERENCE (PASS.reference + VIEW_OF_LAUNCH)
+#define OTHER (PASS.other + VIEW_OF_LAUNCH)
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Between the levels of the image pyramid. Every view has one entry for each level, with a camera of its own;
-// PASS.other is the same view one level finer (downsample) or coarser (upsample).
+// OTHER is the same view one level finer (downsample) or coarser (upsample).
 
 // Mean of the four finer pixels; masked unless at least three of them are usable.
 FN void downsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -8,17 +8,17 @@ FN void downsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float n = 0.0f;
   for (int i = 0; i < 4; ++i) {
     ivec2 q = ivec2(2 * pixel.x + (i & 1), 2 * pixel.y + (i >> 1));
-    float a = intensity_at(CONTEXT PASS.other, q);
+    float a = intensity_at(CONTEXT OTHER, q);
     if (a < 0.0f) continue;
     sum += a;
     n += 1.0f;
   }
-  store_intensity(CONTEXT PASS.reference, pixel, n >= 3.0f ? sum / n : MASKED_INTENSITY);
+  store_intensity(CONTEXT REFERENCE, pixel, n >= 3.0f ? sum / n : MASKED_INTENSITY);
 }
 
 // Starts a pixel from fronto-spherical planes at PASS.steps inverse distances over the whole range.
 FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (!is_usable(CONTEXT pixel, usable_ray)) {
     store_no_plane(CONTEXT pixel);
     return;
@@ -30,13 +30,13 @@ FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float share = (float(i) + 0.5f) / float(PASS.steps);
     best = better_of(CONTEXT pixel, ray, best, (range.z + share * (range.w - range.z)) * ray, 0.0f);
   }
-  store_hypothesis(CONTEXT PASS.reference, pixel, best);
+  store_hypothesis(CONTEXT REFERENCE, pixel, best);
 }
 
 // Starts a pixel from the best of the four nearest coarser pixels' planes: evaluated at the finer ray they
 // are exact, so slanted surfaces need no interpolation. A random plane where there is none.
 FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (!is_usable(CONTEXT pixel, usable_ray)) {
     store_no_plane(CONTEXT pixel);
     return;
@@ -48,13 +48,13 @@ FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     if (i < 4) {
       ivec2 q = ivec2(pixel.x / 2 + (i & 1) * ((pixel.x & 1) * 2 - 1),
                       pixel.y / 2 + (i >> 1) * ((pixel.y & 1) * 2 - 1));
-      if (!in_image(PARAMETERS.cameras[PASS.other].size, q)) continue;
-      vec4 parent = hypothesis_at(CONTEXT PASS.other, q);
+      if (!in_image(PARAMETERS.cameras[OTHER].size, q)) continue;
+      vec4 parent = hypothesis_at(CONTEXT OTHER, q);
       m = vec3(parent.x, parent.y, parent.z);
     } else if (best.w >= INVALID_COST) {
       m = random_plane(CONTEXT pixel, ray, 0);
     }
     best = better_of(CONTEXT pixel, ray, best, m, 0.0f);
   }
-  store_hypothesis(CONTEXT PASS.reference, pixel, best);
+  store_hypothesis(CONTEXT REFERENCE, pixel, best);
 }

@@ -60,8 +60,8 @@ FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 s
 // Stores the regressed plane (m, 1) as the pixel's prior, zero where there is none. Without PASS.deviation the
 // pixel keeps its distance and gets a normal alone.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = vec3(held.x, held.y, held.z);
   vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
@@ -74,34 +74,34 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.offset = dot(m, ray);
     plane.slope_x = dot(m, east) / (TANGENT_SCALE * TANGENT_SCALE);
     plane.slope_y = dot(m, south) / (TANGENT_SCALE * TANGENT_SCALE);
-    vec4 own = check_at(CONTEXT PASS.reference, pixel);
+    vec4 own = check_at(CONTEXT REFERENCE, pixel);
     bool found = PASS.deviation > 0.0f ? regress_plane(CONTEXT pixel, ray, east, south, own, plane)
                                          : regress_slopes(CONTEXT pixel, ray, east, south, own, plane);
     vec3 regressed = plane.offset * ray + plane.slope_x * east + plane.slope_y * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);
   }
-  store_prior(CONTEXT PASS.reference, pixel, prior);
+  store_prior(CONTEXT REFERENCE, pixel, prior);
 }
 
 // Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN only its point must
 // be seen: the cost stays and the measure follows, for another regression that needs no new one. With HELD_UNSEEN the
 // plane that the pixel holds came like that: where it stays it gets a cost of its own, of no information at most.
 FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   bool held_unseen = (PASS.candidates & HELD_UNSEEN) != 0u;
   if (held.w >= INVALID_COST || (prior.w == 0.0f && !held_unseen)) return;
   vec3 own = vec3(held.x, held.y, held.z);
   vec3 m = prior.w != 0.0f ? vec3(prior.x, prior.y, prior.z) : own;
   if ((PASS.candidates & ADOPT_UNSEEN) != 0u) {
-    vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+    vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
     vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
     if (prior.w == 0.0f || !in_some_source(CONTEXT unit_ray, m)) return;
     vec4 adopted = vec4(m, held.w);
-    store_hypothesis(CONTEXT PASS.reference, pixel, adopted);
-    vec4 measure = check_at(CONTEXT PASS.reference, pixel);
+    store_hypothesis(CONTEXT REFERENCE, pixel, adopted);
+    vec4 measure = check_at(CONTEXT REFERENCE, pixel);
     measure.z = inverse_distance_of(adopted, unit_ray);
-    store_check(CONTEXT PASS.reference, pixel, measure);
+    store_check(CONTEXT REFERENCE, pixel, measure);
     return;
   }
   // A loop over both planes: the cost function is then compiled once.
@@ -112,5 +112,5 @@ FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     m = own;
   }
   if (cost >= INVALID_COST && held_unseen) cost = NO_INFORMATION_COST;
-  if (cost < INVALID_COST) store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
+  if (cost < INVALID_COST) store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, cost));
 }

@@ -7,7 +7,7 @@
 // Random numbers of this iteration and frame.
 FN vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
   uint seed = PASS.seed + 0x9e3779b9u * uint(PARAMETERS.frame.x);
-  return random4(seed, PASS.reference, pixel, PASS.iteration, slot);
+  return random4(seed, REFERENCE, pixel, PASS.iteration, slot);
 }
 
 FN vec3 normal_from_angles(float theta, float phi) {
@@ -97,22 +97,22 @@ FN vec3 candidate_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, int i
   int dy = side == NEIGHBOUR_UP ? -1 : (side == NEIGHBOUR_DOWN ? 1 : 0);
   ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
   if ((PASS.neighbours & side) == 0) return vec3(0.0f, 0.0f, 0.0f);
-  if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) return vec3(0.0f, 0.0f, 0.0f);
-  vec4 neighbour = hypothesis_at(CONTEXT PASS.reference, q);
+  if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) return vec3(0.0f, 0.0f, 0.0f);
+  vec4 neighbour = hypothesis_at(CONTEXT REFERENCE, q);
   return vec3(neighbour.x, neighbour.y, neighbour.z);
 }
 
 FN void store_random_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   vec3 m = random_plane(CONTEXT pixel, ray, 0);
-  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+  store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
 }
 
 FN void store_no_plane(CONTEXT_ARGUMENT ivec2 pixel) {
-  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(0.0f, 0.0f, 0.0f, INVALID_COST));
+  store_hypothesis(CONTEXT REFERENCE, pixel, vec4(0.0f, 0.0f, 0.0f, INVALID_COST));
 }
 
 FN void initialise_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
   if (ray.w == 0.0f) {
     store_no_plane(CONTEXT pixel);
   } else {
@@ -121,14 +121,14 @@ FN void initialise_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 }
 
 FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (usable_ray.w == 0.0f) return;
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   // One loop for all candidates: the cost function is then compiled once.
   int candidates = 4 + PARAMETERS.search.y;
   for (int i = 0; i < candidates; ++i) {
     held = better_of(CONTEXT pixel, ray, held, candidate_plane(CONTEXT pixel, ray, held, i), 0.0f);
   }
-  store_hypothesis(CONTEXT PASS.reference, pixel, held);
+  store_hypothesis(CONTEXT REFERENCE, pixel, held);
 }

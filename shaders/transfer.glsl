@@ -5,18 +5,18 @@
 // Pixels along each side of what a plane is warped onto: the four around it, so that the planes of another view,
 // which sees everything at another size, leave no holes. Between two frames of one view the nearest one is enough
 // and does not fatten what is near, frame after frame; renewing fills the holes.
-FN int splat_side(CONTEXT_ARGUMENT_ONLY) { return PASS.other == PASS.reference ? 1 : 2; }
+FN int splat_side(CONTEXT_ARGUMENT_ONLY) { return OTHER == REFERENCE ? 1 : 2; }
 
-// Where pixel p of view PASS.other lands in the reference view: top left of its pixels and its inverse distance
+// Where pixel p of view OTHER lands in the reference view: top left of its pixels and its inverse distance
 // there. False where it has no plane or lands outside the model's domain.
 FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inverse_distance) {
   corner = ivec2(0, 0);
   inverse_distance = 0.0f;
-  vec4 ray = ray_at(CONTEXT PASS.other, p);
-  vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
+  vec4 ray = ray_at(CONTEXT OTHER, p);
+  vec4 plane = hypothesis_at(CONTEXT OTHER, p);
   if (ray.w == 0.0f || plane.w >= INVALID_COST) return false;
-  ViewPair pair = pair_between(CONTEXT PASS.other, PASS.reference);
-  CameraParameters camera = PARAMETERS.cameras[PASS.reference];
+  ViewPair pair = pair_between(CONTEXT OTHER, REFERENCE);
+  CameraParameters camera = PARAMETERS.cameras[REFERENCE];
   vec3 m = vec3(plane.x, plane.y, plane.z);
   vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
   vec2 position;
@@ -42,7 +42,7 @@ FN void transfer_nearest_pixel(CONTEXT_ARGUMENT ivec2 p) {
   int side = splat_side(CONTEXT_ONLY);
   for (int i = 0; i < side * side; ++i) {
     ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
-    if (in_image(PARAMETERS.cameras[PASS.reference].size, q)) {
+    if (in_image(PARAMETERS.cameras[REFERENCE].size, q)) {
       transfer_nearest_raise(CONTEXT q, float_as_uint(inverse_distance));
     }
   }
@@ -52,11 +52,11 @@ FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
   ivec2 corner;
   float inverse_distance;
   if (!forward_warp(CONTEXT p, corner, inverse_distance)) return;
-  uint index = uint(p.y * PARAMETERS.cameras[PASS.other].size.x + p.x);
+  uint index = uint(p.y * PARAMETERS.cameras[OTHER].size.x + p.x);
   int side = splat_side(CONTEXT_ONLY);
   for (int i = 0; i < side * side; ++i) {
     ivec2 q = ivec2(corner.x + (i & 1), corner.y + (i >> 1));
-    if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
+    if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) continue;
     // Tolerant, because another kernel may have rounded the same inverse distance differently.
     float nearest = uint_as_float(transfer_nearest_at(CONTEXT q));
     if (inverse_distance >= nearest * 0.9999f) transfer_winner_lower(CONTEXT q, index);
@@ -70,17 +70,17 @@ FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   vec3 none = vec3(0.0f, 0.0f, 0.0f);
   uint index = transfer_winner_at(CONTEXT pixel);
   if (index == 0xffffffffu) return none;
-  int width = PARAMETERS.cameras[PASS.other].size.x;
+  int width = PARAMETERS.cameras[OTHER].size.x;
   ivec2 p = ivec2(int(index) % width, int(index) / width);
-  vec4 plane = hypothesis_at(CONTEXT PASS.other, p);
-  ViewPair pair = pair_between(CONTEXT PASS.other, PASS.reference);
+  vec4 plane = hypothesis_at(CONTEXT OTHER, p);
+  ViewPair pair = pair_between(CONTEXT OTHER, REFERENCE);
   vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
   if (admissible(CONTEXT ray, moved)) return moved;
   return none;
 }
 
 FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (usable_ray.w == 0.0f) {
     store_no_plane(CONTEXT pixel);
     return;
@@ -88,18 +88,18 @@ FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = transferred_plane(CONTEXT pixel, ray);
   if (!is_plane(m)) m = random_plane(CONTEXT pixel, ray, 0);
-  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
+  store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
 }
 
-// The same between two frames of one view, PASS.other being the reference: the moved planes go where the priors
+// The same between two frames of one view, OTHER being the reference: the moved planes go where the priors
 // are, since other pixels still read the planes that they come from. (m, 1), zero where there is none.
 FN void transfer_keep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 m = vec3(0.0f, 0.0f, 0.0f);
   if (usable_ray.w != 0.0f) {
     m = transferred_plane(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z));
   }
-  store_prior(CONTEXT PASS.reference, pixel, vec4(m, is_plane(m) ? 1.0f : 0.0f));
+  store_prior(CONTEXT REFERENCE, pixel, vec4(m, is_plane(m) ? 1.0f : 0.0f));
 }
 
 // The moved plane of the nearest pixel, about, that has one which this pixel may hold: surfaces continue into what
@@ -109,8 +109,8 @@ FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
     for (int i = 0; i < 8; ++i) {
       int side = i < 4 ? i : i + 1;  // without the middle of 3x3
       ivec2 q = ivec2(pixel.x + radius * (side % 3 - 1), pixel.y + radius * (side / 3 - 1));
-      if (!in_image(PARAMETERS.cameras[PASS.reference].size, q)) continue;
-      vec4 prior = prior_at(CONTEXT PASS.reference, q);
+      if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) continue;
+      vec4 prior = prior_at(CONTEXT REFERENCE, q);
       vec3 m = vec3(prior.x, prior.y, prior.z);
       if (prior.w != 0.0f && admissible(CONTEXT ray, m)) return m;
     }
@@ -120,16 +120,16 @@ FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
 
 // Starts a pixel from the plane that has moved there, which was seen before where its patch now is not.
 FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (!is_usable(CONTEXT pixel, usable_ray)) {
     store_no_plane(CONTEXT pixel);
     return;
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec4 prior = prior_at(CONTEXT PASS.reference, pixel);
+  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   vec3 m = vec3(prior.x, prior.y, prior.z);
   if (prior.w == 0.0f) m = moved_plane_nearby(CONTEXT pixel, ray);
   float cost = patch_cost(CONTEXT pixel, m);
   if (cost >= INVALID_COST && in_some_source(CONTEXT ray, m)) cost = NO_INFORMATION_COST;
-  store_hypothesis(CONTEXT PASS.reference, pixel, vec4(m, cost));
+  store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, cost));
 }

@@ -18,5 +18,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) transfer_clear_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) transfer_clear_pixel(pixel);
 }

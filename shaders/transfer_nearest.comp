@@ -18,5 +18,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.other, pixel)) transfer_nearest_pixel(pixel);
+  if (thread_pixel(OTHER, pixel)) transfer_nearest_pixel(pixel);
 }

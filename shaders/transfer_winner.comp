@@ -18,5 +18,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.other, pixel)) transfer_winner_pixel(pixel);
+  if (thread_pixel(OTHER, pixel)) transfer_winner_pixel(pixel);
 }

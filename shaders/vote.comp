@@ -19,5 +19,5 @@
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(pass.reference, pixel)) vote_pixel(pixel);
+  if (thread_pixel(REFERENCE, pixel)) vote_pixel(pixel);
 }

@@ -38,7 +38,7 @@ FN float support_between(float w, float candidate, float scale) {
 // Inverse of the mean squared difference of intensity over the middle of the patch, noise included. It must not explain
 // a wrong plane by gain and offset, as a correlation of so few pixels could.
 FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
-  ViewPair pair = pair_between(CONTEXT PASS.reference, source);
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   float n = 0.0f;
   float sum = 0.0f;
@@ -48,7 +48,7 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       int first = first_column(CONTEXT VOTE_MIDDLE_RADIUS, dy);
       RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
       for (int dx = 0; dx <= VOTE_MIDDLE_RADIUS - first; dx += COLUMN_STEP) {
-        float a = intensity_at(CONTEXT PASS.reference, ivec2(pixel.x + first + dx, pixel.y + dy));
+        float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + first + dx, pixel.y + dy));
         float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
         if (min(a, b) < 0.0f) continue;
         float difference = min(abs(a - b), LARGEST_DIFFERENCE);
@@ -66,12 +66,12 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
 // most, for which support and likeness in the source speak most; zero where there is none. Planes around are weighted by
 // nearness and likeness of intensity.
 FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT PASS.reference, pixel);
-  vec4 held = hypothesis_at(CONTEXT PASS.reference, pixel);
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
   if (is_usable(CONTEXT pixel, usable_ray) && held.w < INVALID_COST) {
     vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-    ivec4 size = PARAMETERS.cameras[PASS.reference].size;
+    ivec4 size = PARAMETERS.cameras[REFERENCE].size;
     float own = inverse_distance_of(held, ray);
     vec2 velocity;
     int source = telling_source(CONTEXT ray, own, velocity);
@@ -84,12 +84,12 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       candidates[i] = own;
       support[i] = 0.0f;
       if (!in_image(size, q)) continue;
-      vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+      vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
       vec3 m = vec3(plane.x, plane.y, plane.z);
       bool differs = abs(dot(m, ray) - own) * speed > SAME_DISPLACEMENT;
       if (differs && plane.w < INVALID_COST && admissible(CONTEXT ray, m)) candidates[i] = dot(m, ray);
     }
-    float intensity = intensity_at(CONTEXT PASS.reference, pixel);
+    float intensity = intensity_at(CONTEXT REFERENCE, pixel);
     float fall_off = 1.0f / float(PASS.radius * PASS.radius);
     float inverse_scale = PARAMETERS.support.y;
     float most = 0.0f;
@@ -101,12 +101,12 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       for (int dx = first_x; dx <= PASS.radius; dx += VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         if (!in_image(size, q)) continue;
-        vec4 plane = hypothesis_at(CONTEXT PASS.reference, q);
+        vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         if (plane.w >= INVALID_COST) continue;
         float w = inverse_distance_of(plane, ray);
         float weight =
             1.0f / eighth_power(root_of_growth(float(dx * dx + dy * dy) * fall_off) *
-                                root_of_unlikeness(intensity_at(CONTEXT PASS.reference, q), intensity, inverse_scale));
+                                root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q), intensity, inverse_scale));
         most += weight * support_between(w, own, scale);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
           support[i] += weight * support_between(w, candidates[i], scale);
@@ -142,7 +142,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     if (count == 1) count = 0;
     float best = 0.0f;
     for (int k = 0; k < count; ++k) {
-      vec4 plane = hypothesis_at(CONTEXT PASS.reference, standing[k]);
+      vec4 plane = hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
       float score = votes[k] * likeness_of_middle(CONTEXT source, pixel, m);
       if (score > best) {
@@ -151,5 +151,5 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       }
     }
   }
-  store_prior(CONTEXT PASS.reference, pixel, prior);
+  store_prior(CONTEXT REFERENCE, pixel, prior);
 }

@@ -83,34 +83,39 @@ class CpuBackend final : public Backend {
 
  private:
   void launch(const Schedule& schedule, const Dispatch& dispatch) {
-    const Context context{schedule.parameters, dispatch.pass,     schedule.constants,
-                          views_.data(),       transfer_nearest_, transfer_winner_};
+    for (int view = 0; view < dispatch.views; ++view) launch(schedule, dispatch, view);
+  }
+
+  /// `view`: counted from the launch's first one.
+  void launch(const Schedule& schedule, const Dispatch& dispatch, int view) {
+    const Context context{
+        schedule.parameters, dispatch.pass, schedule.constants, views_.data(), transfer_nearest_,
+        transfer_winner_,    view};
     const PixelFunction function = pixel_functions[static_cast<std::size_t>(dispatch.kernel)];
+    const cv::Size size = views_[static_cast<std::size_t>(dispatch.over + view)].rays.size();
     if (dispatch.kernel == Kernel::iterate_raster) {
-      launch_in_order(context, dispatch, function);
+      launch_in_order(context, size, function);
       return;
     }
     const int colour = dispatch.pass.colour;
     const int step = colour < 0 ? 1 : 2;
-    cv::parallel_for_(cv::Range(dispatch.pass.first_row, dispatch.pass.last_row),
-                      [&](const cv::Range& rows) {
-                        for (int y = rows.start; y < rows.end; ++y) {
-                          const int first = colour < 0 ? 0 : (y + colour) % 2;
-                          for (int x = first; x < dispatch.width; x += step) {
-                            function(context, ivec2(x, y));
-                          }
-                        }
-                      });
+    cv::parallel_for_(cv::Range(0, size.height), [&](const cv::Range& rows) {
+      for (int y = rows.start; y < rows.end; ++y) {
+        const int first = colour < 0 ? 0 : (y + colour) % 2;
+        for (int x = first; x < size.width; x += step) {
+          function(context, ivec2(x, y));
+        }
+      }
+    });
   }
 
   /// Forwards when propagating from left and above, backwards when from right and below.
-  static void launch_in_order(const Context& context, const Dispatch& dispatch,
-                              PixelFunction function) {
-    const int pixels = dispatch.width * dispatch.height;
-    const bool forwards = (dispatch.pass.neighbours & NEIGHBOUR_LEFT) != 0;
+  static void launch_in_order(const Context& context, cv::Size size, PixelFunction function) {
+    const int pixels = size.area();
+    const bool forwards = (context.pass.neighbours & NEIGHBOUR_LEFT) != 0;
     for (int i = 0; i < pixels; ++i) {
       const int index = forwards ? i : pixels - 1 - i;
-      function(context, ivec2(index % dispatch.width, index / dispatch.width));
+      function(context, ivec2(index % size.width, index / size.width));
     }
   }
 

@@ -36,12 +36,14 @@ struct Context {
   ViewMemory* views;
   cv::Mat_<int>& transfer_nearest;  ///< of the reference view; bit patterns of unsigned integers
   cv::Mat_<int>& transfer_winner;
+  int view_of_launch = 0;  ///< see shaders/portable.h
 };
 
 #define WINDOW_RADIUS context.constants.window_radius
 #define WARP context.constants.warp
 #define CAMERA_MODEL context.constants.camera_model
 #define SOURCE_COUNT context.constants.source_count
+#define VIEW_OF_LAUNCH context.view_of_launch
 #define PATTERN context.constants.pattern
 #define WEIGHTED context.constants.weighted
 #define FILTER FILTER_EXACT

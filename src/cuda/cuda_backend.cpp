@@ -22,7 +22,8 @@ bool same_launches(const Schedule& a, const Schedule& b) {
   return a.constants == b.constants &&
          std::equal(a.dispatches.begin(), a.dispatches.end(), b.dispatches.begin(),
                     b.dispatches.end(), [](const Dispatch& x, const Dispatch& y) {
-                      return x.kernel == y.kernel && x.width == y.width && x.height == y.height &&
+                      return x.kernel == y.kernel && x.views == y.views && x.width == y.width &&
+                             x.height == y.height &&
                              std::memcmp(&x.pass, &y.pass, sizeof x.pass) == 0;
                     });
 }
@@ -193,11 +194,11 @@ void CudaBackend::launch(const Prepared& prepared, const Band& band, cudaStream_
   const LaunchGrid grid =
       launch_grid(dispatch.width, band.last_row - band.first_row, dispatch.pass.colour);
   std::array<void*, 1> arguments = {&context};
-  check(
-      cudaLaunchKernel(kernel_function(dispatch.kernel, constants_), dim3(grid.columns, grid.rows),
-                       dim3(kernel::cuda::block_width, kernel::cuda::block_height),
-                       arguments.data(), 0, stream),
-      (std::string("launch the kernel ") + to_string(dispatch.kernel)).c_str());
+  check(cudaLaunchKernel(kernel_function(dispatch.kernel, constants_),
+                         dim3(grid.columns, grid.rows, static_cast<unsigned>(dispatch.views)),
+                         dim3(kernel::cuda::block_width, kernel::cuda::block_height),
+                         arguments.data(), 0, stream),
+        (std::string("launch the kernel ") + to_string(dispatch.kernel)).c_str());
 }
 
 std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {

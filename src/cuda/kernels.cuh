@@ -33,6 +33,7 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 #define FILTER (C::filter >= 0 ? C::filter : context.filter)
 #define CAMERA_MODEL (C::camera_model >= 0 ? C::camera_model : context.camera_model)
 #define SOURCE_COUNT context.source_count
+#define VIEW_OF_LAUNCH static_cast<int>(blockIdx.z)
 #define HAS_DEVICE_FILTER
 #undef PARAMETERS
 #define PARAMETERS (*context.parameters)
@@ -100,7 +101,7 @@ struct Algorithm {
   FN void store_prior(CONTEXT_ARGUMENT int view, ivec2 p, vec4 m) {
     context.views[view].priors[index_of(CONTEXT view, p)] = to_float4(m);
   }
-  FN int transfer_index(CONTEXT_ARGUMENT ivec2 p) { return index_of(CONTEXT PASS.reference, p); }
+  FN int transfer_index(CONTEXT_ARGUMENT ivec2 p) { return index_of(CONTEXT REFERENCE, p); }
   FN void transfer_reset(CONTEXT_ARGUMENT ivec2 p) {
     context.transfer_nearest[transfer_index(CONTEXT p)] = 0u;
     context.transfer_winner[transfer_index(CONTEXT p)] = 0xffffffffu;
@@ -142,7 +143,8 @@ struct Algorithm {
     pixel = ivec2(static_cast<int>(blockIdx.x * block_width + threadIdx.x),
                   static_cast<int>(blockIdx.y * block_height + threadIdx.y) + PASS.first_row);
     if (PASS.colour >= 0) pixel.x = 2 * pixel.x + ((pixel.y + PASS.colour) & 1);
-    return pixel.x < PARAMETERS.cameras[view].size.x && pixel.y < PASS.last_row;
+    const ivec4 size = PARAMETERS.cameras[view].size;
+    return pixel.x < size.x && pixel.y < min(PASS.last_row, size.y);
   }
 };
 
@@ -157,32 +159,32 @@ constexpr int blocks_of_any = 4;
                                     C::window_radius >= 0 ? blocks : blocks_of_any) \
       name(const __grid_constant__ Context context) {                               \
     ivec2 pixel;                                                                    \
-    if (Algorithm<C>::thread_pixel(context, context.pass.view, pixel)) {            \
+    if (Algorithm<C>::thread_pixel(context, view, pixel)) {                         \
       Algorithm<C>::name##_pixel(context, pixel);                                   \
     }                                                                               \
   }
 #define ENTRY_POINT(name, view) ENTRY_POINT_OF_BLOCKS(name, view, blocks_of_presets)
 
-ENTRY_POINT(initialise, reference)
-ENTRY_POINT(iterate, reference)
-ENTRY_POINT(transfer_clear, reference)
-ENTRY_POINT(transfer_nearest, other)
-ENTRY_POINT(transfer_winner, other)
-ENTRY_POINT(transfer_gather, reference)
-ENTRY_POINT_OF_BLOCKS(check, reference, 1)
-ENTRY_POINT(downsample, reference)
-ENTRY_POINT(sweep, reference)
-ENTRY_POINT(upsample, reference)
-ENTRY_POINT(search, reference)
-ENTRY_POINT(measure, reference)
-ENTRY_POINT(regress, reference)
-ENTRY_POINT(adopt, reference)
-ENTRY_POINT(fill, reference)
-ENTRY_POINT(adopt_fill, reference)
-ENTRY_POINT(vote, reference)
-ENTRY_POINT(transfer_keep, reference)
-ENTRY_POINT(renew, reference)
-ENTRY_POINT(interpolate, reference)
+ENTRY_POINT(initialise, REFERENCE)
+ENTRY_POINT(iterate, REFERENCE)
+ENTRY_POINT(transfer_clear, REFERENCE)
+ENTRY_POINT(transfer_nearest, OTHER)
+ENTRY_POINT(transfer_winner, OTHER)
+ENTRY_POINT(transfer_gather, REFERENCE)
+ENTRY_POINT_OF_BLOCKS(check, REFERENCE, 1)
+ENTRY_POINT(downsample, REFERENCE)
+ENTRY_POINT(sweep, REFERENCE)
+ENTRY_POINT(upsample, REFERENCE)
+ENTRY_POINT(search, REFERENCE)
+ENTRY_POINT(measure, REFERENCE)
+ENTRY_POINT(regress, REFERENCE)
+ENTRY_POINT(adopt, REFERENCE)
+ENTRY_POINT(fill, REFERENCE)
+ENTRY_POINT(adopt_fill, REFERENCE)
+ENTRY_POINT(vote, REFERENCE)
+ENTRY_POINT(transfer_keep, REFERENCE)
+ENTRY_POINT(renew, REFERENCE)
+ENTRY_POINT(interpolate, REFERENCE)
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}

@@ -12,7 +12,7 @@ constexpr long long rows_of_workgroup = 8;
 long long estimated_work(const Dispatch& dispatch, const KernelConstants& constants) {
   if (dispatch.samples > 0) return dispatch.samples;
   const long long window = 2 * constants.window_radius + 1;
-  return window * window * dispatch.width * dispatch.height;
+  return window * window * dispatch.pixels;
 }
 
 }  // namespace

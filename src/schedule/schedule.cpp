@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "geometry/camera_parameters.h"
 #include "kernel/enumerations.h"
@@ -96,7 +97,15 @@ constexpr unsigned random_distance = 1u << CANDIDATE_RANDOM_DISTANCE;
 constexpr unsigned surroundings = 1u << CANDIDATE_SURROUNDINGS;
 constexpr unsigned source_planes = 1u << CANDIDATE_SOURCE_PLANE;
 
-/// Appends the dispatches of one schedule.
+/// Views that one launch runs over.
+struct Views {
+  int first = 0;
+  int count = 1;
+};
+
+/// Appends the dispatches of one schedule. What reads nothing that it writes in other views is
+/// launched over all views of a level at once, which fills a GPU that one view of a coarse level
+/// leaves idle.
 class Builder {
  public:
   Builder(const Rig& rig, const Options& options) : options_(options) {
@@ -133,11 +142,13 @@ class Builder {
 
   Schedule build_warm() {
     interpolate(0);
-    for (const int view : views_of(0)) move_on(view);
+    // One by one: they share the transfer buffers.
+    for (const int view : each_of(views_of(0))) move_on(view);
+    add(Kernel::renew, pass_of(views_of(0)), views_of(0), 1);
     if (options_.search == SearchMethod::pyramid) {
       search_warm();
     } else {
-      for (const int view : views_of(0)) iterate(view, options_.warm_iterations);
+      iterate(views_of(0), options_.warm_iterations);
     }
     return finished();
   }
@@ -164,63 +175,57 @@ class Builder {
 
   /// Sources are read at half pixels; the intensities of this level must be there.
   void interpolate(int level) {
-    for (const int view : views_of(level)) {
-      kernel::PassParameters pass = pass_of(view);
-      pass.candidates = options_.interpolation == Interpolation::cubic ? INTERPOLATE_CUBIC : 0;
-      add(Kernel::interpolate, pass, view, 0);
-    }
+    kernel::PassParameters pass = pass_of(views_of(level));
+    pass.candidates = options_.interpolation == Interpolation::cubic ? INTERPOLATE_CUBIC : 0;
+    add(Kernel::interpolate, pass, views_of(level), 0);
   }
 
   void build_random() {
-    start_at_random(0);
-    iterate(0, options_.first_iterations);
+    add(Kernel::initialise, pass_of({0}), {0}, 1);
+    iterate({0}, options_.first_iterations);
     for (int view = 1; view < views_of_rig_; ++view) {
       start_from(view, 0);
-      iterate(view, options_.second_iterations);
+      iterate({view}, options_.second_iterations);
     }
   }
 
   void build_pyramid() {
     for (int level = 1; level < levels_; ++level) {
-      for (const int view : views_of(level)) add_between_levels(Kernel::downsample, view, -1, 0);
+      add_between_levels(Kernel::downsample, level, level - 1, 0);
       interpolate(level);
     }
     for (int level = levels_ - 1; level >= 0; --level) {
-      for (const int view : views_of(level)) {
-        if (level == levels_ - 1) {
-          sweep(view);
-        } else {
-          add_between_levels(Kernel::upsample, view, +1, 4);
-        }
+      if (level == levels_ - 1) {
+        sweep(level);
+      } else {
+        add_between_levels(Kernel::upsample, level, level + 1, 4);
       }
       const int place = levels_ - 1 - level;
       for (int i = 0; i < options_.level_iterations[place]; ++i) {
         const bool last = level == 0 && i + 1 == options_.level_iterations[place];
         const unsigned candidates = cold_candidates(level == levels_ - 1, i == 0, last);
-        for (const int view : views_of(level)) search(view, i, {candidates, candidates});
+        search(level, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
-        for (const int view : views_of(level)) {
-          measure(view, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
-          regress(view, level, precision_of_round(i), level == 0 ? until_vote() : 0);
-        }
+        measure(level, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
+        regress(level, precision_of_round(i), level == 0 ? until_vote() : 0);
         if (level > 0) continue;
         repair();
         vote();
       }
     }
     if (options_.level_regressions.back() > 0) {
-      for (const int view : views_of(0)) {
-        measure(view, 0);
-        regress(view, 0, 0, 0);
-      }
+      measure(0, 0);
+      regress(0, 0, 0);
     }
   }
 
-  std::vector<int> views_of(int level) const {
-    std::vector<int> views;
-    for (int i = 0; i < views_of_rig_; ++i) views.push_back(level * views_of_rig_ + i);
-    return views;
+  Views views_of(int level) const { return {level * views_of_rig_, views_of_rig_}; }
+
+  static std::vector<int> each_of(Views views) {
+    std::vector<int> numbers(static_cast<std::size_t>(views.count));
+    std::iota(numbers.begin(), numbers.end(), views.first);
+    return numbers;
   }
 
   int common_model() const {
@@ -231,11 +236,11 @@ class Builder {
     return static_cast<int>(model);
   }
 
-  kernel::PassParameters pass_of(int view) const {
+  kernel::PassParameters pass_of(Views views) const {
     kernel::PassParameters pass{};
-    pass.reference = view;
-    pass.first_view = view / views_of_rig_ * views_of_rig_;
-    pass.other = view;
+    pass.reference = views.first;
+    pass.first_view = views.first / views_of_rig_ * views_of_rig_;
+    pass.other = views.first;
     pass.iteration = 0;
     pass.colour = -1;
     pass.neighbours = all_neighbours;
@@ -243,47 +248,52 @@ class Builder {
     return pass;
   }
 
-  /// `over`: the view whose pixels the kernel runs over; `patches`: evaluated per pixel in every
+  /// `over`: the views whose pixels the kernel runs over; `patches`: evaluated per pixel in every
   /// source.
-  void add(Kernel kernel, const kernel::PassParameters& pass, int over, int patches) {
+  void add(Kernel kernel, const kernel::PassParameters& pass, Views over, int patches) {
     add_with_patches(kernel, pass, over, patches * (views_of_rig_ - 1));
   }
 
   /// The same, `patches` being those in all sources together.
-  void add_with_patches(Kernel kernel, const kernel::PassParameters& pass, int over, int patches) {
+  void add_with_patches(Kernel kernel, const kernel::PassParameters& pass, Views over,
+                        int patches) {
     add_with_samples(
         kernel, pass, over,
         patches * samples_of_patch(schedule_.constants.window_radius, schedule_.constants.pattern));
   }
 
   /// `samples`: per pixel, in all sources together.
-  void add_with_samples(Kernel kernel, kernel::PassParameters pass, int over, long long samples) {
-    const Camera& camera = schedule_.views[over].camera;
-    const long long pixels = static_cast<long long>(camera.width) * camera.height;
+  void add_with_samples(Kernel kernel, kernel::PassParameters pass, Views over, long long samples) {
+    Dispatch dispatch{.kernel = kernel, .over = over.first, .views = over.count};
+    for (const int view : each_of(over)) {
+      const Camera& camera = schedule_.views[static_cast<std::size_t>(view)].camera;
+      const long long pixels = static_cast<long long>(camera.width) * camera.height;
+      dispatch.width = std::max(dispatch.width, camera.width);
+      dispatch.height = std::max(dispatch.height, camera.height);
+      dispatch.pixels += pixels;
+      dispatch.samples += pixels / (pass.colour < 0 ? 1 : 2) * samples;
+    }
     pass.first_row = 0;
-    pass.last_row = camera.height;
-    schedule_.dispatches.push_back(
-        {kernel, pass, camera.width, camera.height, pixels / (pass.colour < 0 ? 1 : 2) * samples});
+    pass.last_row = dispatch.height;
+    dispatch.pass = pass;
+    schedule_.dispatches.push_back(dispatch);
   }
 
-  void start_at_random(int view) { add(Kernel::initialise, pass_of(view), view, 1); }
-
   void start_from(int view, int other) {
-    kernel::PassParameters pass = pass_of(view);
+    kernel::PassParameters pass = pass_of({view});
     pass.other = other;
-    add(Kernel::transfer_clear, pass, view, 0);
-    add(Kernel::transfer_nearest, pass, other, 0);
-    add(Kernel::transfer_winner, pass, other, 0);
-    add(Kernel::transfer_gather, pass, view, 1);
+    add(Kernel::transfer_clear, pass, {view}, 0);
+    add(Kernel::transfer_nearest, pass, {other}, 0);
+    add(Kernel::transfer_winner, pass, {other}, 0);
+    add(Kernel::transfer_gather, pass, {view}, 1);
   }
 
   void move_on(int view) {
-    const kernel::PassParameters pass = pass_of(view);
-    add(Kernel::transfer_clear, pass, view, 0);
-    add(Kernel::transfer_nearest, pass, view, 0);
-    add(Kernel::transfer_winner, pass, view, 0);
-    add(Kernel::transfer_keep, pass, view, 0);
-    add(Kernel::renew, pass, view, 1);
+    const kernel::PassParameters pass = pass_of({view});
+    add(Kernel::transfer_clear, pass, {view}, 0);
+    add(Kernel::transfer_nearest, pass, {view}, 0);
+    add(Kernel::transfer_winner, pass, {view}, 0);
+    add(Kernel::transfer_keep, pass, {view}, 0);
   }
 
   /// Little more than what corrects planes that are nearly right: the near strips, half of them for
@@ -293,52 +303,48 @@ class Builder {
   void search_warm() {
     constexpr unsigned perturbations = inverse_distance | random_distance;
     for (int i = 0; i < options_.warm_iterations; ++i) {
-      for (const int view : views_of(0)) {
-        search(view, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
-      }
+      search(0, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
-    for (const int view : views_of(0)) measure(view, 0);
+    measure(0, 0);
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const bool last = i + 1 == options_.warm_regressions;
       const unsigned how =
           (last ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN) | (i > 0 ? HELD_UNSEEN : 0);
-      for (const int view : views_of(0)) {
-        regress(view, 0, precision_of_round(i), how, warm_regression_steps());
-      }
+      regress(0, precision_of_round(i), how, warm_regression_steps());
     }
     repair();
     vote();
   }
 
-  void iterate(int view, int iterations) {
-    kernel::PassParameters pass = pass_of(view);
+  void iterate(Views views, int iterations) {
+    kernel::PassParameters pass = pass_of(views);
     for (int iteration = 1; iteration <= iterations; ++iteration) {
       pass.iteration = iteration;
       if (options_.propagation == Propagation::raster) {
         pass.neighbours = iteration % 2 == 1 ? left_and_up : right_and_down;
-        add(Kernel::iterate_raster, pass, view, 2 + options_.refinements);
+        add(Kernel::iterate_raster, pass, views, 2 + options_.refinements);
         continue;
       }
       for (int colour = 0; colour < 2; ++colour) {
         pass.colour = colour;
-        add(Kernel::iterate, pass, view, 4 + options_.refinements);
+        add(Kernel::iterate, pass, views, 4 + options_.refinements);
       }
     }
   }
 
-  /// `step`: +1 takes from the coarser level, -1 from the finer one.
-  void add_between_levels(Kernel kernel, int view, int step, int patches) {
-    kernel::PassParameters pass = pass_of(view);
-    pass.other = view + step * views_of_rig_;
-    add(kernel, pass, view, patches);
+  /// `from`: the next coarser or finer level.
+  void add_between_levels(Kernel kernel, int level, int from, int patches) {
+    kernel::PassParameters pass = pass_of(views_of(level));
+    pass.other = views_of(from).first;
+    add(kernel, pass, views_of(level), patches);
   }
 
-  void sweep(int view) {
-    kernel::PassParameters pass = pass_of(view);
+  void sweep(int level) {
+    kernel::PassParameters pass = pass_of(views_of(level));
     pass.steps = options_.sweep_steps;
-    add(Kernel::sweep, pass, view, options_.sweep_steps);
+    add(Kernel::sweep, pass, views_of(level), options_.sweep_steps);
   }
 
   /// `first`: of the level; `last`: of all.
@@ -360,8 +366,17 @@ class Builder {
   }
 
   /// `candidates`: of each colour.
-  void search(int view, int iteration, const std::array<unsigned, 2>& candidates) {
-    kernel::PassParameters pass = pass_of(view);
+  void search(int level, int iteration, const std::array<unsigned, 2>& candidates) {
+    if (((candidates[0] | candidates[1]) & source_planes) == 0) {
+      search(views_of(level), iteration, candidates);
+      return;
+    }
+    // A view's planes are candidates of the next one's.
+    for (const int view : each_of(views_of(level))) search(Views{view}, iteration, candidates);
+  }
+
+  void search(Views views, int iteration, const std::array<unsigned, 2>& candidates) {
+    kernel::PassParameters pass = pass_of(views);
     pass.iteration = iteration + 1;
     const double share = std::pow(0.5, iteration);
     pass.step_pixels = static_cast<float>(options_.step_pixels * share);
@@ -369,7 +384,7 @@ class Builder {
     for (int colour = 0; colour < 2; ++colour) {
       pass.colour = colour;
       pass.candidates = candidates[static_cast<std::size_t>(colour)];
-      add(Kernel::search, pass, view, std::popcount(pass.candidates));
+      add(Kernel::search, pass, views, std::popcount(pass.candidates));
     }
   }
 
@@ -382,11 +397,11 @@ class Builder {
   }
 
   /// `how` of measure() and regress(): see shaders/measure.glsl and regression.glsl.
-  void measure(int view, unsigned how) {
-    kernel::PassParameters pass = pass_of(view);
+  void measure(int level, unsigned how) {
+    kernel::PassParameters pass = pass_of(views_of(level));
     pass.candidates = how;
     // A sub-pixel match looks at the source that tells most.
-    add_with_patches(Kernel::measure, pass, view, (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
+    add_with_patches(Kernel::measure, pass, views_of(level), (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
   }
 
   /// Planes that were regressed in the frame before need fewer neighbours.
@@ -395,14 +410,14 @@ class Builder {
     return std::max(std::min(options_.regression_steps, fewest), options_.regression_steps / 2);
   }
 
-  /// The view must have been measured. `precision`: 0 leaves the distances as they are.
-  void regress(int view, int level, double precision, unsigned how) {
-    regress(view, level, precision, how, options_.regression_steps);
+  /// The views must have been measured. `precision`: 0 leaves the distances as they are.
+  void regress(int level, double precision, unsigned how) {
+    regress(level, precision, how, options_.regression_steps);
   }
 
   /// `steps`: of the grid of neighbours.
-  void regress(int view, int level, double precision, unsigned how, int steps) {
-    kernel::PassParameters pass = pass_of(view);
+  void regress(int level, double precision, unsigned how, int steps) {
+    kernel::PassParameters pass = pass_of(views_of(level));
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
     // normals alone: a slope needs a wider base than a distance.
@@ -412,8 +427,8 @@ class Builder {
     pass.steps = steps;
     pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
-    add(Kernel::regress, pass, view, 0);
-    add(Kernel::adopt, pass, view, (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
+    add(Kernel::regress, pass, views_of(level), 0);
+    add(Kernel::adopt, pass, views_of(level), (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
   }
 
   /// Regressed planes get their costs when they have been voted on. Until then, pixels keep those
@@ -422,34 +437,27 @@ class Builder {
 
   void vote() {
     if (options_.vote_radius == 0) return;
-    for (const int view : views_of(0)) {
-      kernel::PassParameters pass = pass_of(view);
-      pass.iteration = regressions_;
-      pass.radius = options_.vote_radius;
-      // Those of the pixel's own plane and of its rivals, in the source that tells most.
-      add_with_samples(
-          Kernel::vote, pass, view,
-          (1 + VOTE_RIVALS) * samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
-      pass.candidates = HELD_UNSEEN;
-      add(Kernel::adopt, pass, view, 1);
-    }
+    kernel::PassParameters pass = pass_of(views_of(0));
+    pass.iteration = regressions_;
+    pass.radius = options_.vote_radius;
+    // Those of the pixel's own plane and of its rivals, in the source that tells most.
+    add_with_samples(
+        Kernel::vote, pass, views_of(0),
+        (1 + VOTE_RIVALS) * samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
+    pass.candidates = HELD_UNSEEN;
+    add(Kernel::adopt, pass, views_of(0), 1);
   }
 
   /// Checks every view, then fills: filled planes must not count as a source's own.
   void check_and_fill(int places, int fill_radius, unsigned reasons_not_to_fill) {
-    for (const int view : views_of(0)) {
-      kernel::PassParameters pass = pass_of(view);
-      pass.places = places;
-      add(Kernel::check, pass, view, places);
-    }
+    kernel::PassParameters pass = pass_of(views_of(0));
+    pass.places = places;
+    add(Kernel::check, pass, views_of(0), places);
     if (fill_radius == 0) return;
-    for (const int view : views_of(0)) {
-      kernel::PassParameters pass = pass_of(view);
-      pass.radius = fill_radius;
-      pass.candidates = reasons_not_to_fill;
-      add(Kernel::fill, pass, view, 0);
-      add(Kernel::adopt_fill, pass, view, 1);
-    }
+    pass.radius = fill_radius;
+    pass.candidates = reasons_not_to_fill;
+    add(Kernel::fill, pass, views_of(0), 0);
+    add(Kernel::adopt_fill, pass, views_of(0), 1);
   }
 
   /// Lets pixels that fail the checks try the planes around them.

@@ -50,13 +50,16 @@ struct KernelConstants {
   bool operator==(const KernelConstants&) const = default;
 };
 
-/// One launch over all pixels of view `pass.reference`. Writes of one dispatch are visible to the
-/// next.
+/// One launch over all pixels of a view, or of several, none of which reads what another one's
+/// threads write. Writes of one dispatch are visible to the next.
 struct Dispatch {
   Kernel kernel = Kernel::initialise;
   kernel::PassParameters pass{};
-  int width = 0;  ///< pixels of the reference view
+  int over = 0;   ///< the view, or the first of them; `pass.reference` or `pass.other`
+  int views = 1;  ///< how many there are: they follow each other
+  int width = 0;  ///< pixels, of the largest of them
   int height = 0;
+  long long pixels = 0;   ///< of all of them, both colours
   long long samples = 0;  ///< patch samples at full windows, for splitting and progress
 };
 

@@ -208,7 +208,7 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const double patches =
       samples / static_cast<double>(
                     samples_of_patch(schedule.constants.window_radius, schedule.constants.pattern));
-  const double pixels = static_cast<double>(dispatch.width) * dispatch.height;
+  const auto pixels = static_cast<double>(dispatch.pixels);
   const Traffic traffic = traffic_of(dispatch);
   const int sources = schedule.constants.source_count;
   return {.samples = samples,

@@ -3,6 +3,7 @@
 // matches by statistics (PatchMatch turns rounding differences into different winners at ties).
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -51,26 +52,35 @@ void expect_agreement(const ViewResult& expected, const ViewResult& actual, doub
   EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97);
 }
 
-/// Runs a schedule up to its first dispatch of a kernel; returns the hypotheses of every view.
-std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& pair,
-                               Schedule schedule) {
-  keep_first(schedule, last);
+/// With the images and without planes.
+std::unique_ptr<Backend> make_backend(Device& device, const Schedule& schedule,
+                                      const RenderedPair& pair) {
   std::vector<cv::Size> sizes;
-  for (const View& view : pair.rig.views) sizes.emplace_back(view.camera.width, view.camera.height);
-  const auto backend = device.implementation().make_backend(sizes, schedule.constants);
-  std::vector<cv::Mat> hypotheses;
-  for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
-    const cv::Mat rays = ray_image(pair.rig.views[i].camera, {});
+  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  auto backend = device.implementation().make_backend(sizes, schedule.constants);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const int view = static_cast<int>(i);
+    const cv::Mat rays = ray_image(schedule.views[i].camera, {});
+    backend->set_rays(view, rays);
+    backend->set_hypotheses(view, cv::Mat(sizes[i], CV_32FC4, cv::Scalar(0, 0, 0, 2)));
+    if (i >= pair.views.size()) continue;
     cv::Mat usable;
     cv::extractChannel(rays, usable, 3);
     cv::Mat intensity = to_intensity(pair.views[i].image, "test");
     intensity.setTo(MASKED_INTENSITY, usable == 0);
-    backend->set_rays(i, rays);
-    backend->set_intensity(i, intensity);
-    backend->set_hypotheses(i, cv::Mat(sizes[i], CV_32FC4, cv::Scalar(0, 0, 0, 2)));
+    backend->set_intensity(view, intensity);
   }
+  return backend;
+}
+
+/// Runs a schedule up to its first dispatch of a kernel; returns the hypotheses of every view.
+std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& pair,
+                               Schedule schedule) {
+  keep_first(schedule, last);
+  const auto backend = make_backend(device, schedule, pair);
   backend->run(schedule, {});
-  for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
+  std::vector<cv::Mat> hypotheses;
+  for (int i = 0; i < static_cast<int>(pair.views.size()); ++i) {
     hypotheses.push_back(backend->hypotheses(i));
   }
   return hypotheses;
@@ -616,6 +626,48 @@ TEST(Costs, AreThoseOfThePlanes) {
         }
         EXPECT_EQ(wrong, 0) << preset << " " << start << " " << vote_radius;
       }
+    }
+  }
+}
+
+/// The same with one launch for each view, the last view first.
+Schedule of_single_views(const Schedule& schedule) {
+  Schedule single = schedule;
+  single.dispatches.clear();
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    for (int view = dispatch.views - 1; view >= 0; --view) {
+      Dispatch& one = single.dispatches.emplace_back(dispatch);
+      one.views = 1;
+      one.over += view;
+      one.pass.reference += view;
+      one.pass.other += view;
+    }
+  }
+  return single;
+}
+
+TEST(Launches, OverSeveralViewsMayRunThemInAnyOrder) {
+  const RenderedPair pair = render_demo(64);
+  Device device = Device::open("cpu");
+  for (const std::string& preset : Options::preset_names()) {
+    SCOPED_TRACE(preset);
+    Options options = Options::preset_named(preset);
+    std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+    options.first_iterations = 2;
+    options.second_iterations = 2;
+    options.fill_radius = 8;
+    const Schedule cold = make_schedule(pair.rig, options);
+    const Schedule warm = make_warm_schedule(pair.rig, options);
+    std::vector<std::unique_ptr<Backend>> backends;
+    for (const bool as_one : {true, false}) {
+      Backend& backend = *backends.emplace_back(make_backend(device, cold, pair));
+      for (const Schedule& schedule : {cold, warm}) {
+        backend.run(as_one ? schedule : of_single_views(schedule), {});
+      }
+    }
+    for (int view = 0; view < 2; ++view) {
+      EXPECT_EQ(cv::norm(backends[0]->hypotheses(view), backends[1]->hypotheses(view)), 0);
+      EXPECT_EQ(cv::norm(backends[0]->checks(view), backends[1]->checks(view)), 0);
     }
   }
 }

@@ -394,10 +394,11 @@ cudaError_t cudaFuncGetAttributes(cudaFuncAttributes*, const void*) {
 }
 cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void** arguments,
                              std::size_t, cudaStream_t stream) {
-  constexpr unsigned largest_grid_height = 65535;
+  constexpr unsigned largest_grid_height = 65535;  // and depth
   constexpr unsigned largest_block = 1024;
-  const bool legal = grid.x > 0 && grid.y > 0 && grid.z == 1 && grid.y <= largest_grid_height &&
-                     block.z == 1 && block.x * block.y > 0 && block.x * block.y <= largest_block;
+  const bool legal = grid.x > 0 && grid.y > 0 && grid.z > 0 && grid.y <= largest_grid_height &&
+                     grid.z <= largest_grid_height && block.z == 1 && block.x * block.y > 0 &&
+                     block.x * block.y <= largest_block;
   if (!legal) return cudaErrorInvalidValue;
   const widestereo::test::ThreadFunction thread =
       widestereo::test::bind_kernel(function, arguments);
@@ -405,10 +406,12 @@ cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void**
   if (const cudaError_t error = step()) return error;
   enqueue(stream, [=] {
     ++emulation().kernels_run;
-    cv::parallel_for_(cv::Range(0, static_cast<int>(grid.y)), [&](const cv::Range& rows) {
-      for (int y = rows.start; y < rows.end; ++y) {
+    const int all_rows = static_cast<int>(grid.y * grid.z);
+    cv::parallel_for_(cv::Range(0, all_rows), [&](const cv::Range& rows) {
+      for (int row = rows.start; row < rows.end; ++row) {
         for (unsigned x = 0; x < grid.x; ++x) {
-          blockIdx = dim3(x, static_cast<unsigned>(y));
+          const auto y = static_cast<unsigned>(row);
+          blockIdx = dim3(x, y % grid.y, y / grid.y);
           for (unsigned i = 0; i < block.x * block.y; ++i) {
             threadIdx = dim3(i % block.x, i / block.x);
             thread();

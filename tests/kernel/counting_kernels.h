@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <vector>
 
 #include "kernel_fixture.h"
 
@@ -13,6 +14,7 @@ namespace widestereo::test::counting {
 struct Counts {
   long operations = 0;
   long texels = 0;
+  std::vector<cv::Point> checks;  ///< pixels whose check was read, in order
 };
 inline Counts counts;
 
@@ -83,6 +85,7 @@ struct Context {
   PassParameters pass;
   KernelConstants constants;
   kernel::cpu::Context plain;
+  int view_of_launch = 0;
 };
 
 inline Context context_of(KernelFixture& fixture) {
@@ -104,6 +107,7 @@ inline vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return numbers<vec4>(kernel::cpu::hypothesis_at(context.plain, view, p));
 }
 inline vec4 check_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  counts.checks.emplace_back(p.x, p.y);
   return numbers<vec4>(kernel::cpu::check_at(context.plain, view, p));
 }
 inline vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {

@@ -102,13 +102,13 @@ class KernelFixture {
 
   /// Makes the images' half pixels, as the schedule begins; after every change of an image.
   void interpolate() {
-    for (const Dispatch& dispatch : schedule_.dispatches) {
-      const auto view = static_cast<std::size_t>(dispatch.pass.reference);
-      if (dispatch.kernel != Kernel::interpolate || view >= views_.size()) continue;
-      const kernel::cpu::Context context{schedule_.parameters, dispatch.pass, schedule_.constants,
-                                         views_.data(),        nearest_,      winner_};
-      for (int y = 0; y < dispatch.height; ++y) {
-        for (int x = 0; x < dispatch.width; ++x) kernel::cpu::interpolate_pixel(context, {x, y});
+    const kernel::PassParameters& pass = schedule_.dispatches.front().pass;
+    for (int i = 0; i < static_cast<int>(views_.size()); ++i) {
+      const kernel::cpu::Context context{
+          schedule_.parameters, pass, schedule_.constants, views_.data(), nearest_, winner_, i};
+      const cv::Size size = view(i).rays.size();
+      for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width; ++x) kernel::cpu::interpolate_pixel(context, {x, y});
       }
     }
   }

@@ -48,5 +48,30 @@ TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
   EXPECT_THAT(error_of([&] { make_schedule(one, one_level); }), HasSubstr("1 view(s)"));
 }
 
+/// Launches of one view each.
+std::vector<Kernel> single_launches(const Schedule& schedule) {
+  std::vector<Kernel> kernels;
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    EXPECT_TRUE(dispatch.views == 1 || dispatch.over == dispatch.pass.reference);
+    if (dispatch.views == 1) kernels.push_back(dispatch.kernel);
+  }
+  return kernels;
+}
+
+TEST(Launches, RunOverAllViewsOfALevelWhereTheseDoNotReadEachOther) {
+  using ::testing::Each;
+  using ::testing::IsEmpty;
+  using ::testing::SizeIs;
+  const Rig rig = rig_of(3);
+  const Options fast = Options::preset_named("fast");
+  EXPECT_THAT(single_launches(make_schedule(rig, fast)), IsEmpty());
+  // Planes that move on share the transfer buffers.
+  EXPECT_THAT(single_launches(make_warm_schedule(rig, fast)), SizeIs(3 * 4));
+  // All but the first iteration try the other views' planes; two colours.
+  const Options quality = Options::preset_named("quality");
+  EXPECT_THAT(single_launches(make_schedule(rig, quality)),
+              ::testing::AllOf(SizeIs(3 * 2 * (4 + 3 + 2 - 1)), Each(Kernel::search)));
+}
+
 }  // namespace
 }  // namespace widestereo::test

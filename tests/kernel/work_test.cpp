@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "counting_kernels.h"
 
@@ -65,26 +67,48 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
   }
 }
 
-TEST(Work, OfAPlaneFitIsWhatRunningItTakes) {
-  KernelFixture fixture(fisheye_rig(96), Options::preset_named("fast"));
+/// What fitting a plane around a pixel takes, and the neighbours that it asks, relative to the
+/// pixel.
+counting::Counts counts_of_fit(KernelFixture& fixture, cv::Point pixel, int radius, int steps) {
   fixture.set_reference(0);
   fixture.view(0).checks.setTo(cv::Scalar(0.01, 3, 0.5, 0.5));
+  fixture.pass().steps = steps;
+  const counting::Context context = counting::context_of(fixture);
+  const counting::vec3 ray(0, 0, 1), east(TANGENT_SCALE, 0, 0), south(0, TANGENT_SCALE, 0);
+  const counting::LocalPlane guess{0.5f, 0.0f, 0.0f};
+  const counting::vec4 own = counting::check_at(context, 0, {pixel.x, pixel.y});
+  counting::PlaneFit fit;
+  counting::counts = {};
+  EXPECT_TRUE(counting::fit_plane(context, {pixel.x, pixel.y}, ray, east, south, own, 0, radius,
+                                  guess, fit));
+  for (cv::Point& neighbour : counting::counts.checks) neighbour -= pixel;
+  return counting::counts;
+}
+
+TEST(Work, OfAPlaneFitIsWhatRunningItTakes) {
+  KernelFixture fixture(fisheye_rig(96), Options::preset_named("fast"));
   for (const auto& [radius, steps] : {std::pair(1, 4), std::pair(5, 4), std::pair(12, 6)}) {
     SCOPED_TRACE(radius);
-    fixture.pass().steps = steps;
-    const counting::Context context = counting::context_of(fixture);
-    const counting::vec3 ray(0, 0, 1), east(TANGENT_SCALE, 0, 0), south(0, TANGENT_SCALE, 0);
-    const counting::LocalPlane guess{0.5f, 0.0f, 0.0f};
-    counting::PlaneFit fit;
-    counting::counts = {};
-    EXPECT_TRUE(counting::fit_plane(context, {48, 48}, ray, east, south,
-                                    counting::check_at(context, 0, {48, 48}), 0, radius, guess,
-                                    fit));
     const FitOperations expected;
-    const int side = side_of_fit(radius, steps);
-    EXPECT_EQ(counting::counts.operations,
+    const long side = side_of_fit(radius, steps);
+    const counting::Counts counts = counts_of_fit(fixture, {48, 48}, radius, steps);
+    EXPECT_EQ(counts.operations,
               expected.of_fit + side * (expected.of_row + side * expected.of_neighbour));
+    EXPECT_EQ(counts.checks.size(), static_cast<std::size_t>(side * side));
   }
+}
+
+TEST(Work, OfPlaneFitsOfATileReadsSideBySide) {
+  KernelFixture fixture(fisheye_rig(96), Options::preset_named("fast"));
+  std::set<std::pair<int, int>> places;
+  for (int y = 40; y < 48; y += 4) {
+    for (int x = 40; x < 56; x += 8) {
+      const std::vector<cv::Point> first = counts_of_fit(fixture, {x, y}, 30, 4).checks;
+      EXPECT_EQ(counts_of_fit(fixture, {x + 7, y + 3}, 30, 4).checks, first);
+      places.emplace(first.front().x, first.front().y);
+    }
+  }
+  EXPECT_GT(places.size(), 2u) << "other tiles' grids lie elsewhere";
 }
 
 TEST(Work, OfAScheduleAddsUp) {
@@ -116,13 +140,12 @@ TEST(Work, OfASubPixelMatchIsAPatchInOneSource) {
   const long long samples = samples_of_patch(constants.window_radius, constants.pattern);
   int measures = 0;
   for (const Dispatch& dispatch : schedule.dispatches) {
-    const long long pixels = static_cast<long long>(dispatch.width) * dispatch.height;
     if (dispatch.kernel == Kernel::measure && dispatch.samples > 0) {
-      EXPECT_EQ(dispatch.samples, pixels * samples);
-      ++measures;
+      EXPECT_EQ(dispatch.samples, dispatch.pixels * samples);
+      measures += dispatch.views;
     }
     if (dispatch.kernel == Kernel::sweep) {
-      EXPECT_EQ(dispatch.samples % (2 * pixels * samples), 0);
+      EXPECT_EQ(dispatch.samples % (2 * dispatch.pixels * samples), 0);
     }
   }
   EXPECT_EQ(measures, 3 * 3) << "one for each view and level";
