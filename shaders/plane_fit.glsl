@@ -6,9 +6,6 @@
 #define LARGEST_RESIDUAL 0.6f
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
-// Pixels that share the place of their grids: those whose threads a GPU runs at once then load neighbours side by side.
-#define GRID_TILE_WIDTH 8
-#define GRID_TILE_HEIGHT 4
 // Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
 #define TANGENT_SCALE 128.0f
 
@@ -41,8 +38,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   radius = min(radius, step * PASS.steps);
   float fall_off = 0.25f / float(radius * radius);  // of the eighth root of the Gaussian
   // Every tile's grids lie elsewhere: pixels a step apart would share theirs and none with those between.
-  ivec2 tile = ivec2(pixel.x / GRID_TILE_WIDTH, pixel.y / GRID_TILE_HEIGHT);
-  vec4 u = draw4(CONTEXT tile, REGRESSION_SLOT + round);
+  vec4 u = draw4_of_tile(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = pixel.x - radius + int(u.x * float(step)) - step / 2;
   int first_y = pixel.y - radius + int(u.y * float(step)) - step / 2;
   while (first_x < 0) first_x += step;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // PatchMatch over plane hypotheses: random initialisation, propagation and random refinement of one pixel.
 
+// Pixels of a tile.
+#define TILE_WIDTH 8
+#define TILE_HEIGHT 4
 // Share of the range of inverse distance over which half of the preference for far planes builds up.
 #define SATURATED_SHARE 0.03f
 
@@ -8,6 +11,12 @@
 FN vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
   uint seed = PASS.seed + 0x9e3779b9u * uint(PARAMETERS.frame.x);
   return random4(seed, REFERENCE, pixel, PASS.iteration, slot);
+}
+
+// The same for all pixels of a tile, whose grids of neighbours then lie at the same place: the threads that a GPU runs at
+// once load neighbours side by side.
+FN vec4 draw4_of_tile(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
+  return draw4(CONTEXT ivec2(pixel.x / TILE_WIDTH, pixel.y / TILE_HEIGHT), slot);
 }
 
 FN vec3 normal_from_angles(float theta, float phi) {

@@ -93,8 +93,8 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float fall_off = 1.0f / float(PASS.radius * PASS.radius);
     float inverse_scale = PARAMETERS.support.y;
     float most = 0.0f;
-    // Every pixel asks others, so that neighbours do not all make the same mistake.
-    vec4 u = draw4(CONTEXT pixel, VOTE_SLOT);
+    // Every tile asks others, so that its neighbours do not make the same mistake.
+    vec4 u = draw4_of_tile(CONTEXT pixel, VOTE_SLOT);
     int first_x = int(u.x * float(VOTE_STEP)) - PASS.radius;
     int first_y = int(u.y * float(VOTE_STEP)) - PASS.radius;
     for (int dy = first_y; dy <= PASS.radius; dy += VOTE_STEP) {

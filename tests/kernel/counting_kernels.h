@@ -110,8 +110,8 @@ inline vec4 check_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   counts.checks.emplace_back(p.x, p.y);
   return numbers<vec4>(kernel::cpu::check_at(context.plain, view, p));
 }
-inline vec4 draw4(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
-  return numbers<vec4>(kernel::cpu::draw4(context.plain, pixel, slot));
+inline vec4 draw4_of_tile(CONTEXT_ARGUMENT ivec2 pixel, int slot) {
+  return numbers<vec4>(kernel::cpu::draw4_of_tile(context.plain, pixel, slot));
 }
 
 #define float Number
