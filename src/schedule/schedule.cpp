@@ -207,17 +207,28 @@ class Builder {
         search(level, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
-        measure(level, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
-        regress(level, precision_of_round(i), level == 0 ? until_vote() : 0);
+        for (const Views views : views_to_regress(level)) {
+          measure(views, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
+          regress(views, precision_of_round(i), level == 0 ? until_vote() : 0);
+        }
         if (level > 0) continue;
         repair();
         vote();
       }
     }
     if (options_.level_regressions.back() > 0) {
-      measure(0, 0);
-      regress(0, 0, 0);
+      measure(views_of(0), 0);
+      regress(views_of(0), 0, 0);
     }
+  }
+
+  /// Where a launch of one view fills a GPU, views are measured against the ones before that are
+  /// regressed already: they agree better.
+  std::vector<Views> views_to_regress(int level) const {
+    if (level > 0) return {views_of(level)};
+    std::vector<Views> views;
+    for (const int view : each_of(views_of(0))) views.push_back({view});
+    return views;
   }
 
   Views views_of(int level) const { return {level * views_of_rig_, views_of_rig_}; }
@@ -307,12 +318,12 @@ class Builder {
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
-    measure(0, 0);
+    measure(views_of(0), 0);
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const bool last = i + 1 == options_.warm_regressions;
       const unsigned how =
           (last ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN) | (i > 0 ? HELD_UNSEEN : 0);
-      regress(0, precision_of_round(i), how, warm_regression_steps());
+      regress(views_of(0), precision_of_round(i), how, warm_regression_steps());
     }
     repair();
     vote();
@@ -397,11 +408,11 @@ class Builder {
   }
 
   /// `how` of measure() and regress(): see shaders/measure.glsl and regression.glsl.
-  void measure(int level, unsigned how) {
-    kernel::PassParameters pass = pass_of(views_of(level));
+  void measure(Views views, unsigned how) {
+    kernel::PassParameters pass = pass_of(views);
     pass.candidates = how;
     // A sub-pixel match looks at the source that tells most.
-    add_with_patches(Kernel::measure, pass, views_of(level), (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
+    add_with_patches(Kernel::measure, pass, views, (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
   }
 
   /// Planes that were regressed in the frame before need fewer neighbours.
@@ -411,24 +422,24 @@ class Builder {
   }
 
   /// The views must have been measured. `precision`: 0 leaves the distances as they are.
-  void regress(int level, double precision, unsigned how) {
-    regress(level, precision, how, options_.regression_steps);
+  void regress(Views views, double precision, unsigned how) {
+    regress(views, precision, how, options_.regression_steps);
   }
 
   /// `steps`: of the grid of neighbours.
-  void regress(int level, double precision, unsigned how, int steps) {
-    kernel::PassParameters pass = pass_of(views_of(level));
+  void regress(Views views, double precision, unsigned how, int steps) {
+    kernel::PassParameters pass = pass_of(views);
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
     // normals alone: a slope needs a wider base than a distance.
-    pass.radius =
-        level == 0 ? options_.regression_radius : std::max(2, options_.regression_radius / 3);
+    pass.radius = pass.first_view == 0 ? options_.regression_radius
+                                       : std::max(2, options_.regression_radius / 3);
     if (precision == 0) pass.radius *= 4;
     pass.steps = steps;
     pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
-    add(Kernel::regress, pass, views_of(level), 0);
-    add(Kernel::adopt, pass, views_of(level), (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
+    add(Kernel::regress, pass, views, 0);
+    add(Kernel::adopt, pass, views, (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
   }
 
   /// Regressed planes get their costs when they have been voted on. Until then, pixels keep those
