@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <numeric>
 
 #include "geometry/camera_parameters.h"
 #include "kernel/enumerations.h"
@@ -143,7 +142,7 @@ class Builder {
   Schedule build_warm() {
     interpolate(0);
     // One by one: they share the transfer buffers.
-    for (const int view : each_of(views_of(0))) move_on(view);
+    for (const Views view : launches(0, one_by_one)) move_on(view);
     add(Kernel::renew, pass_of(views_of(0)), views_of(0), 1);
     if (options_.search == SearchMethod::pyramid) {
       search_warm();
@@ -207,7 +206,9 @@ class Builder {
         search(level, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
-        for (const Views views : views_to_regress(level)) {
+        // Where a launch of one view fills a GPU, views are measured against the ones before that
+        // are regressed already: they agree better.
+        for (const Views views : launches(level, level > 0 ? at_once : one_by_one)) {
           measure(views, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
           regress(views, precision_of_round(i), level == 0 ? until_vote() : 0);
         }
@@ -222,21 +223,16 @@ class Builder {
     }
   }
 
-  /// Where a launch of one view fills a GPU, views are measured against the ones before that are
-  /// regressed already: they agree better.
-  std::vector<Views> views_to_regress(int level) const {
-    if (level > 0) return {views_of(level)};
-    std::vector<Views> views;
-    for (const int view : each_of(views_of(0))) views.push_back({view});
-    return views;
-  }
-
   Views views_of(int level) const { return {level * views_of_rig_, views_of_rig_}; }
 
-  static std::vector<int> each_of(Views views) {
-    std::vector<int> numbers(static_cast<std::size_t>(views.count));
-    std::iota(numbers.begin(), numbers.end(), views.first);
-    return numbers;
+  enum Order { at_once, one_by_one };
+  /// Of all views of a level.
+  std::vector<Views> launches(int level, Order order) const {
+    const Views all = views_of(level);
+    if (order == at_once) return {all};
+    std::vector<Views> views;
+    for (int i = 0; i < all.count; ++i) views.push_back({all.first + i});
+    return views;
   }
 
   int common_model() const {
@@ -276,8 +272,8 @@ class Builder {
   /// `samples`: per pixel, in all sources together.
   void add_with_samples(Kernel kernel, kernel::PassParameters pass, Views over, long long samples) {
     Dispatch dispatch{.kernel = kernel, .over = over.first, .views = over.count};
-    for (const int view : each_of(over)) {
-      const Camera& camera = schedule_.views[static_cast<std::size_t>(view)].camera;
+    for (int i = 0; i < over.count; ++i) {
+      const Camera& camera = schedule_.views[static_cast<std::size_t>(over.first + i)].camera;
       const long long pixels = static_cast<long long>(camera.width) * camera.height;
       dispatch.width = std::max(dispatch.width, camera.width);
       dispatch.height = std::max(dispatch.height, camera.height);
@@ -299,12 +295,12 @@ class Builder {
     add(Kernel::transfer_gather, pass, {view}, 1);
   }
 
-  void move_on(int view) {
-    const kernel::PassParameters pass = pass_of({view});
-    add(Kernel::transfer_clear, pass, {view}, 0);
-    add(Kernel::transfer_nearest, pass, {view}, 0);
-    add(Kernel::transfer_winner, pass, {view}, 0);
-    add(Kernel::transfer_keep, pass, {view}, 0);
+  void move_on(Views view) {
+    const kernel::PassParameters pass = pass_of(view);
+    add(Kernel::transfer_clear, pass, view, 0);
+    add(Kernel::transfer_nearest, pass, view, 0);
+    add(Kernel::transfer_winner, pass, view, 0);
+    add(Kernel::transfer_keep, pass, view, 0);
   }
 
   /// Little more than what corrects planes that are nearly right: the near strips, half of them for
@@ -378,12 +374,11 @@ class Builder {
 
   /// `candidates`: of each colour.
   void search(int level, int iteration, const std::array<unsigned, 2>& candidates) {
-    if (((candidates[0] | candidates[1]) & source_planes) == 0) {
-      search(views_of(level), iteration, candidates);
-      return;
+    // A view's planes may be candidates of the next one's.
+    const bool reads_views = ((candidates[0] | candidates[1]) & source_planes) != 0;
+    for (const Views views : launches(level, reads_views ? one_by_one : at_once)) {
+      search(views, iteration, candidates);
     }
-    // A view's planes are candidates of the next one's.
-    for (const int view : each_of(views_of(level))) search(Views{view}, iteration, candidates);
   }
 
   void search(Views views, int iteration, const std::array<unsigned, 2>& candidates) {
