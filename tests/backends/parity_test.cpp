@@ -52,7 +52,7 @@ void expect_agreement(const ViewResult& expected, const ViewResult& actual, doub
   EXPECT_GT(agreeing / cv::countNonZero(sure), 0.97);
 }
 
-/// With the images and without planes.
+/// With the rays and the images.
 std::unique_ptr<Backend> make_backend(Device& device, const Schedule& schedule,
                                       const RenderedPair& pair) {
   std::vector<cv::Size> sizes;
@@ -62,7 +62,6 @@ std::unique_ptr<Backend> make_backend(Device& device, const Schedule& schedule,
     const int view = static_cast<int>(i);
     const cv::Mat rays = ray_image(schedule.views[i].camera, {});
     backend->set_rays(view, rays);
-    backend->set_hypotheses(view, cv::Mat(sizes[i], CV_32FC4, cv::Scalar(0, 0, 0, 2)));
     if (i >= pair.views.size()) continue;
     cv::Mat usable;
     cv::extractChannel(rays, usable, 3);
@@ -78,6 +77,10 @@ std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& 
                                Schedule schedule) {
   keep_first(schedule, last);
   const auto backend = make_backend(device, schedule, pair);
+  for (int i = 0; i < static_cast<int>(pair.views.size()); ++i) {
+    backend->set_hypotheses(i,
+                            cv::Mat(pair.views[i].image.size(), CV_32FC4, cv::Scalar(0, 0, 0, 2)));
+  }
   backend->run(schedule, {});
   std::vector<cv::Mat> hypotheses;
   for (int i = 0; i < static_cast<int>(pair.views.size()); ++i) {
@@ -526,16 +529,9 @@ TEST_P(EveryDevice, TreatsPixelsWithoutIntensityAsMasked) {
     options.second_iterations = 1;
     options.fill_radius = 32;
     const Schedule schedule = make_schedule(pair.rig, options);
-    std::vector<cv::Size> sizes;
-    for (const View& view : schedule.views) {
-      sizes.emplace_back(view.camera.width, view.camera.height);
-    }
-    const auto backend = device->implementation().make_backend(sizes, schedule.constants);
-    for (std::size_t i = 0; i < sizes.size(); ++i) {
-      const int view = static_cast<int>(i);
-      backend->set_rays(view, ray_image(schedule.views[i].camera, {}));
-      if (i >= pair.views.size()) continue;
-      cv::Mat intensity = to_intensity(pair.views[i].image, "test");
+    const auto backend = make_backend(*device, schedule, pair);
+    for (int view = 0; view < static_cast<int>(pair.views.size()); ++view) {
+      cv::Mat intensity = to_intensity(pair.views[view].image, "test");
       intensity(hole).setTo(MASKED_INTENSITY);
       backend->set_intensity(view, intensity);
     }
