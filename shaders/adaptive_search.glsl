@@ -50,24 +50,27 @@ FN int telling_source(CONTEXT_ARGUMENT vec3 ray, float w, OUT(vec2) velocity) {
 FN vec3 best_of_strip(CONTEXT_ARGUMENT ivec2 pixel, int strip) {
   bool near = strip < NEAR_STRIPS;
   int side = near ? strip : strip - NEAR_STRIPS;
+  bool upright = side == STRIP_UP || side == STRIP_DOWN;
+  int outward = side == STRIP_UP || side == STRIP_LEFT ? -1 : 1;
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float lowest = INVALID_COST;
-  vec3 best = vec3(0.0f, 0.0f, 0.0f);
+  ivec2 best = pixel;
   int count = near ? 7 : 11;
   for (int k = 0; k < count; ++k) {
     int arm = (k + 1) / 2;
-    int along = near ? 1 + arm : 3 + 2 * k;
+    int along = outward * (near ? 1 + arm : 3 + 2 * k);
     int across = near ? ((k & 1) == 1 ? -arm : arm) : 0;
-    if (side == STRIP_UP || side == STRIP_LEFT) along = -along;
-    ivec2 q = side == STRIP_UP || side == STRIP_DOWN ? ivec2(pixel.x + across, pixel.y + along)
-                                                     : ivec2(pixel.x + along, pixel.y + across);
-    if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) continue;
-    vec4 candidate = hypothesis_at(CONTEXT REFERENCE, q);
-    if (candidate.w < lowest) {
-      lowest = candidate.w;
-      best = vec3(candidate.x, candidate.y, candidate.z);
+    ivec2 q = ivec2(pixel.x + (upright ? across : along), pixel.y + (upright ? along : across));
+    if (!in_image(size, q)) continue;
+    float cost = hypothesis_at(CONTEXT REFERENCE, q).w;
+    if (cost < lowest) {
+      lowest = cost;
+      best = q;
     }
   }
-  return best;
+  // Costs alone are compared first, a quarter of what a plane takes to load.
+  vec4 plane = hypothesis_at(CONTEXT REFERENCE, best);
+  return lowest < INVALID_COST ? vec3(plane.x, plane.y, plane.z) : vec3(0.0f, 0.0f, 0.0f);
 }
 
 // The plane through the same point with a normal moved by up to PASS.step_normal (of unit length).
