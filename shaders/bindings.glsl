@@ -59,7 +59,9 @@ ivec3 in_maps(int view, ivec2 p) { return map_place(view).xyz + ivec3(p, 0); }
 
 ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_place(view).w); }
 
-ivec3 in_intensities(int view, ivec2 p) {
+#define IntensityRow ivec3
+
+IntensityRow intensity_row(int view, ivec2 p) {
   ivec4 place = view == REFERENCE ? intensity_place_of_reference : intensity_places[view];
   return place.xyz + ivec3(p, 0);
 }
@@ -73,23 +75,19 @@ vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, in_maps(view, p)); }
 
 #ifdef TEXEL_LOADS
 
-float intensity_at(int view, ivec2 p) { return imageLoad(intensities, in_intensities(view, p)).x; }
+float intensity_in_row(IntensityRow row, int dx) { return imageLoad(intensities, row + ivec3(dx, 0, 0)).x; }
 
 vec4 half_pixel_taps(int view, ivec2 p) { return imageLoad(half_pixels, in_half_pixels(view, p)); }
 
-float half_pixel_at(int view, ivec2 p) { return half_pixel_taps(view, p).x; }
-
 #else
 
-float intensity_at(int view, ivec2 p) { return texelFetch(intensity_texture, in_intensities(view, p), 0).x; }
+float intensity_in_row(IntensityRow row, int dx) { return texelFetch(intensity_texture, row + ivec3(dx, 0, 0), 0).x; }
 
 // Texture coordinates of a position in texels of the memory.
 vec3 half_pixel_position(int view, vec2 texel) {
   vec2 texel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
   return vec3(texel * texel_size, float(layer_of_half_pixels(view)));
 }
-
-float half_pixel_at(int view, ivec2 p) { return texelFetch(half_pixel_texture, in_half_pixels(view, p), 0).x; }
 
 vec4 half_pixel_taps(int view, ivec2 p) {
   // The corner that the four texels share lies half a texel from any rounding trouble.
@@ -103,6 +101,8 @@ float filtered_half_pixel(int view, vec2 texel) {
 
 #endif
 
+float intensity_at(int view, ivec2 p) { return intensity_in_row(intensity_row(view, p), 0); }
+
 // Images of one number a texel take the first.
 void store_half_pixel(int view, ivec2 p, vec4 taps) { imageStore(half_pixels, in_half_pixels(view, p), taps); }
 
@@ -111,7 +111,7 @@ vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(vie
 void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, in_maps(view, p), h); }
 
 void store_intensity(int view, ivec2 p, float intensity) {
-  imageStore(intensities, in_intensities(view, p), vec4(intensity, 0.0f, 0.0f, 0.0f));
+  imageStore(intensities, intensity_row(view, p), vec4(intensity, 0.0f, 0.0f, 0.0f));
 }
 
 vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(1, view, p)); }

@@ -105,7 +105,7 @@ FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
 FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
   real rho2 = point.x * point.x + point.y * point.y;
   real d = sqrt(rho2 + point.z * point.z);
-  bool inside = d > real(0) && point.z >= camera.domain.x * d;
+  bool inside = point.z > camera.domain.x * d;  // no zero vector
   real x = real(0);
   real y = real(0);
   if (is_fisheye(model)) {
@@ -113,7 +113,8 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     real theta = arc_tangent(rho, point.z);
     real distorted = fisheye_radius(camera, model, theta);
     inside = inside && theta < camera.domain.y;
-    real scale = rho > real(0) ? distorted / rho : real(1) / point.z;
+    bool off_axis = rho > real(0);
+    real scale = (off_axis ? distorted : real(1)) * (real(1) / (off_axis ? rho : point.z));
     x = point.x * scale;
     y = point.y * scale;
   } else if (model == CAMERA_FIELD_OF_VIEW) {
@@ -144,8 +145,9 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
       denominator = camera.shape.x * e + (real(1) - camera.shape.x) * point.z;
     }
     inside = inside && denominator > real(0);
-    x = point.x / denominator;
-    y = point.y / denominator;
+    real scale = real(1) / denominator;
+    x = point.x * scale;
+    y = point.y * scale;
   }
   if (is_distorted(model)) {
     real q = x * x + y * y;

@@ -14,7 +14,7 @@ FN float arc_tangent(float y, float x) {
   if (!(larger > 0.0f)) return 0.0f;
   // tan(pi / 8): beyond it the angle is measured from pi / 4.
   bool beyond = smaller > 0.414213562f * larger;
-  float t = beyond ? (smaller - larger) / (smaller + larger) : smaller / larger;
+  float t = (beyond ? smaller - larger : smaller) * (1.0f / (beyond ? smaller + larger : larger));
   float z = t * t;
   float angle = t + t * z * (-0.333327567f + z * (0.199718792f + z * (-0.138244528f + z * 0.0790259548f)));
   if (beyond) angle = EIGHTH_TURN + angle;

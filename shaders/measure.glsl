@@ -15,17 +15,17 @@
 // Direction in the reference image, per pixel of displacement along `along` (unit) in the source: the inverse of
 // the map's derivative at the pixel; `along` itself where the derivative cannot be measured.
 FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 along) {
-  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
+  PlaneWarp warp = warp_through(pair_between(CONTEXT REFERENCE, source), m);
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   vec2 left;
   vec2 right;
   vec2 up;
   vec2 down;
-  bool ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - 1, pixel.y), left);
-  ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + 1, pixel.y), right) && ok;
-  ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y - 1), up) && ok;
-  ok = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y + 1), down) && ok;
+  bool ok = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x - 1, pixel.y), left);
+  ok = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x + 1, pixel.y), right) && ok;
+  ok = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x, pixel.y - 1), up) && ok;
+  ok = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x, pixel.y + 1), down) && ok;
   if (!ok) return along;
   vec2 jx = 0.5f * (right - left);
   vec2 jy = 0.5f * (down - up);
@@ -35,14 +35,14 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
          vec2(jy.y * along.x - jy.x * along.y, jx.x * along.y - jx.y * along.x);
 }
 
-// Change of the reference's intensity at q per pixel of displacement in the source; false where it is not seen.
-FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) slope) {
-  float left = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x - 1, 2 * q.y));
-  float right = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x + 1, 2 * q.y));
-  float up = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x, 2 * q.y - 1));
-  float down = half_pixel_at(CONTEXT REFERENCE, ivec2(2 * q.x, 2 * q.y + 1));
-  slope = (right - left) * direction.x + (down - up) * direction.y;
-  return min(min(left, right), min(up, down)) >= 0.0f;
+// The reference's intensity at q and its change per pixel of displacement in the source; false where it is not seen.
+FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity, OUT(float) slope) {
+  // Of the half pixels around it, those above and to the left, and those to the right and below.
+  vec4 before = half_pixel_taps(CONTEXT REFERENCE, ivec2(2 * q.x - 1, 2 * q.y - 1));
+  vec4 after = half_pixel_taps(CONTEXT REFERENCE, ivec2(2 * q.x, 2 * q.y));
+  intensity = after.x;
+  slope = (after.y - before.z) * direction.x + (after.z - before.y) * direction.y;
+  return min(min(min(before.z, after.y), min(before.y, after.z)), intensity) >= 0.0f;
 }
 
 // How far (px, along the source's curve) the plane's patch lies from where it matches best, by one step of least
@@ -68,10 +68,10 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
     RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
     for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
       ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
-      float a = intensity_at(CONTEXT REFERENCE, q);
       float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
+      float a;
       float slope;
-      if (!slope_at(CONTEXT q, direction, slope) || min(a, b) < 0.0f) continue;
+      if (!slope_at(CONTEXT q, direction, a, slope) || b < 0.0f) continue;
       a -= start.centre_a;
       b -= start.centre_b;
       float weight = sample_weight(CONTEXT a, inverse_scale);
@@ -131,9 +131,9 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
       for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-        float a = intensity_at(CONTEXT REFERENCE, q);
+        float a;
         float slope;
-        if (!slope_at(CONTEXT q, direction, slope) || a < 0.0f) continue;
+        if (!slope_at(CONTEXT q, direction, a, slope)) continue;
         a -= centre;
         float weight = sample_weight(CONTEXT a, inverse_scale);
         information += weight * slope * slope;

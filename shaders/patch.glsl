@@ -8,6 +8,10 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
+FN ivec2 nearest_in_image(ivec4 size, ivec2 pixel) {
+  return ivec2(clamp(pixel.x, 0, size.x - 1), clamp(pixel.y, 0, size.y - 1));
+}
+
 // Whether the reference has a ray and an intensity there.
 FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
   return ray.w != 0.0f && intensity_at(CONTEXT REFERENCE, pixel) >= 0.0f;
@@ -38,21 +42,22 @@ FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
   return upper + (y - top) * (lower - upper);
 }
 
-// Projects the plane's point on one reference ray into a source; false where the plane is not in front.
-FN bool warp_ray(ViewPair pair, CameraParameters camera, int model, vec3 m, vec3 ray,
-                 OUT(vec2) position) {
-  float w = dot(m, ray);
-  bool inside = project(camera, model, direction_in_source(pair, ray, w), position);
+// Projects the plane's point on one reference ray into a source; false where the plane is not in front, as on the zero
+// ray of a pixel that has none.
+FN bool warp_ray(PlaneWarp warp, CameraParameters camera, int model, vec3 ray, OUT(vec2) position) {
+  float w = dot(warp.m, ray);
+  vec3 direction = vec3(dot(warp.row0, ray), dot(warp.row1, ray), dot(warp.row2, ray));
+  bool inside = project(camera, model, direction, position);
   return inside && w > 0.0f;
 }
 
-FN bool warp_pixel(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, vec3 m,
-                   ivec2 pixel, OUT(vec2) position) {
-  position = vec2(0.0f, 0.0f);
-  if (!in_image(PARAMETERS.cameras[REFERENCE].size, pixel)) return false;
-  vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
-  if (dot(vec3(ray.x, ray.y, ray.z), vec3(ray.x, ray.y, ray.z)) == 0.0f) return false;
-  return warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), position);
+FN bool warp_pixel(CONTEXT_ARGUMENT PlaneWarp warp, CameraParameters camera, int model, ivec2 pixel,
+                   OUT(vec2) position) {
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  // No branch around it, so that a patch's anchors are projected side by side.
+  vec4 ray = ray_at(CONTEXT REFERENCE, nearest_in_image(size, pixel));
+  bool inside = warp_ray(warp, camera, model, vec3(ray.x, ray.y, ray.z), position);
+  return inside && in_image(size, pixel);
 }
 
 // The pixel of the source in which the point lands; false where it lands outside.
@@ -61,7 +66,9 @@ FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2
   CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
   q = ivec2(0, 0);
-  if (!warp_ray(pair, camera, model_of(CONTEXT camera), m, ray, position)) return false;
+  float w = dot(m, ray);
+  bool inside = project(camera, model_of(CONTEXT camera), direction_in_source(pair, ray, w), position);
+  if (!inside || w <= 0.0f) return false;
   // Before the conversion, which is defined only for what an integer holds.
   if (!(position.x >= -0.5f && position.y >= -0.5f && position.x < float(camera.size.x) &&
         position.y < float(camera.size.y))) {
@@ -115,31 +122,31 @@ FN bool map_axis(vec2 centre, bool has_low, vec2 low, bool has_high, vec2 high, 
 
 // Fits the map to exactly projected anchors: the centre, the ends of both axes and, for the quadratic
 // warp, the corners. False where an axis has no anchor.
-FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, vec3 m,
-                  ivec2 pixel, vec2 centre, OUT(PatchMap) map) {
+FN bool map_patch(CONTEXT_ARGUMENT PlaneWarp warp, CameraParameters camera, int model, ivec2 pixel,
+                  vec2 centre, OUT(PatchMap) map) {
   int r = WINDOW_RADIUS;
   map.u0 = centre;
   map.uxy = vec2(0.0f, 0.0f);
   vec2 low;
   vec2 high;
-  bool has_low = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - r, pixel.y), low);
-  bool has_high = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + r, pixel.y), high);
+  bool has_low = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x - r, pixel.y), low);
+  bool has_high = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x + r, pixel.y), high);
   bool has_x = map_axis(centre, has_low, low, has_high, high, float(r), map.ux, map.uxx);
-  has_low = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y - r), low);
-  has_high = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x, pixel.y + r), high);
+  has_low = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x, pixel.y - r), low);
+  has_high = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x, pixel.y + r), high);
   bool has_y = map_axis(centre, has_low, low, has_high, high, float(r), map.uy, map.uyy);
   if (WARP == WARP_QUADRATIC) {
     vec2 a;
     vec2 b;
     vec2 c;
     vec2 d;
-    bool corners = warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - r, pixel.y - r), a);
+    bool corners = warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x - r, pixel.y - r), a);
     corners =
-        warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + r, pixel.y - r), b) && corners;
+        warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x + r, pixel.y - r), b) && corners;
     corners =
-        warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x - r, pixel.y + r), c) && corners;
+        warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x - r, pixel.y + r), c) && corners;
     corners =
-        warp_pixel(CONTEXT pair, camera, model, m, ivec2(pixel.x + r, pixel.y + r), d) && corners;
+        warp_pixel(CONTEXT warp, camera, model, ivec2(pixel.x + r, pixel.y + r), d) && corners;
     if (corners) map.uxy = (0.25f / float(r * r)) * ((d - c) - (b - a));
   }
   return has_x && has_y;
@@ -147,6 +154,7 @@ FN bool map_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int m
 
 // What a patch of the reference starts from in a source.
 struct PatchStart {
+  PlaneWarp warp;
   float centre_a;  // intensity of the reference at the centre
   float centre_b;  // and of the source: sums are taken relative to them, single precision then suffices
   PatchMap map;    // into what sample_image() reads
@@ -156,13 +164,14 @@ struct PatchStart {
 FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, int source,
                     ivec2 pixel, vec3 m, bool mapped, OUT(PatchStart) start) {
   if (side_of_source(pair, m) <= 0.0f) return false;
+  start.warp = warp_through(pair, m);
   vec2 centre;
-  if (!warp_pixel(CONTEXT pair, camera, model, m, pixel, centre)) return false;
+  if (!warp_pixel(CONTEXT start.warp, camera, model, pixel, centre)) return false;
   start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
   start.centre_a = intensity_at(CONTEXT REFERENCE, pixel);
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
   if (!mapped) return true;
-  if (!map_patch(CONTEXT pair, camera, model, m, pixel, centre, start.map)) return false;
+  if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
   start.map.u0 = texel_at(start.map.u0, FILTER);
   start.map.ux = 2.0f * start.map.ux;
   start.map.uy = 2.0f * start.map.uy;
@@ -217,7 +226,8 @@ FN int first_column(CONTEXT_ARGUMENT int radius, int row) {
   return -radius + (PATTERN == PATTERN_CHECKERBOARD ? (radius + row) & 1 : 0);
 }
 
-// The eighth root of growth(); of a sum it is about the product of both.
+// About the eighth root of exp(a) for a >= 0, with the same bits everywhere (elementary.glsl); of a sum it is about the
+// product of both.
 FN float root_of_growth(float a) { return 1.0f + 0.125f * a; }
 
 FN float eighth_power(float t) {
@@ -225,9 +235,6 @@ FN float eighth_power(float t) {
   t = t * t;
   return t * t;
 }
-
-// About exp(a) for a >= 0, with the same bits everywhere (elementary.glsl).
-FN float growth(float a) { return eighth_power(root_of_growth(a)); }
 
 // The eighth root of how unlike two intensities of the reference are, from 1 on: pixels of one surface mostly are
 // alike. `inverse_scale`: PARAMETERS.support.y, which loops read once.
@@ -239,7 +246,7 @@ FN float root_of_unlikeness(float a, float b, float inverse_scale) {
 // which loops read once. Zero for masked samples; others differ by 1 at most.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
   if (WEIGHTED == 0) return difference > -2.0f ? 1.0f : 0.0f;
-  return 1.0f / growth(abs(difference) * inverse_scale);
+  return 1.0f / eighth_power(1.0f + (0.125f * inverse_scale) * abs(difference));
 }
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
@@ -251,6 +258,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   PatchStart start;
   if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, WARP != WARP_EXACT, start)) return INVALID_COST;
 
+  ivec4 size = PARAMETERS.cameras[reference].size;
   float inverse_scale = PARAMETERS.support.x;
   float of_patch = 0.0f;
   float n = 0.0f;
@@ -261,25 +269,27 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_ab = 0.0f;
   UNROLL_ROWS for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
     int first = first_column(CONTEXT WINDOW_RADIUS, dy);
+    ivec2 begin = ivec2(pixel.x + first, pixel.y + dy);
+    IntensityRow intensities_of_row = intensity_row(CONTEXT reference, begin);
     RowMap row;
     if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
     UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
-      ivec2 q = ivec2(pixel.x + first + dx, pixel.y + dy);
-      float a = intensity_at(CONTEXT reference, q) - start.centre_a;
+      float a = intensity_in_row(intensities_of_row, dx) - start.centre_a;
       // Samples that are not seen weigh nothing: no branches, as most are seen.
       float weight = sample_weight(CONTEXT a, inverse_scale);
       of_patch += weight;
       vec2 texel;
+      bool seen = true;
       if (WARP == WARP_EXACT) {
-        if (weight == 0.0f) continue;
-        vec4 ray = ray_at(CONTEXT reference, q);
-        if (!warp_ray(pair, camera, model, m, vec3(ray.x, ray.y, ray.z), texel)) continue;
+        // The image ends where its intensities are masked.
+        vec4 ray = ray_at(CONTEXT reference, nearest_in_image(size, ivec2(begin.x + dx, begin.y)));
+        seen = warp_ray(start.warp, camera, model, vec3(ray.x, ray.y, ray.z), texel);
         texel = texel_at(texel, FILTER);
       } else {
         texel = map_offset(CONTEXT row, float(dx));
       }
       float b = sample_image(CONTEXT source, camera.size, texel);
-      weight = b >= 0.0f ? weight : 0.0f;
+      weight = seen && b >= 0.0f ? weight : 0.0f;
       b -= start.centre_b;
       float weighted_a = weight * a;
       float weighted_b = weight * b;

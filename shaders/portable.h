@@ -7,8 +7,10 @@
 // A back end provides, before including the algorithm:
 //   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
 //   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON pixels outside
-//   float half_pixel_at(view, texel)        intensity at a half pixel; 0, 0: pixel 0, 0; 1, 0: half a pixel to its right
-//   vec4  half_pixel_taps(view, texel)      there and at its right, lower and lower right neighbour
+//   IntensityRow intensity_row(view, pixel), float intensity_in_row(row, dx)
+//                                           the same, dx pixels to the right of that pixel, from one address for a row
+//   vec4  half_pixel_taps(view, texel)      intensity at a half pixel (0, 0: pixel 0, 0; 1, 0: half a pixel to its right)
+//                                           and at its right, lower and lower right neighbour
 //   float filtered_half_pixel(view, texel)  bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
 //                                           its centre at HALF_PIXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
 //   void  store_half_pixel(view, texel, vec4)   as half_pixel_taps() reads them, of which memories may keep the first

@@ -21,13 +21,14 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
   vec2 position;
   if (side_of_source(pair, m) <= 0.0f) return false;
-  if (!warp_ray(pair, camera, model_of(CONTEXT camera), m, unit_ray, position)) return false;
+  float w = dot(m, unit_ray);
+  vec3 direction = direction_in_source(pair, unit_ray, w);
+  if (!project(camera, model_of(CONTEXT camera), direction, position) || w <= 0.0f) return false;
   if (!(position.x > -1.0f && position.y > -1.0f && position.x < float(camera.size.x) &&
         position.y < float(camera.size.y))) {
     return false;
   }
-  float w = dot(m, unit_ray);
-  inverse_distance = w / length(direction_in_source(pair, unit_ray, w));
+  inverse_distance = w / length(direction);
   float offset = splat_side(CONTEXT_ONLY) == 1 ? 0.5f : 0.0f;
   corner = ivec2(int(floor(position.x + offset)), int(floor(position.y + offset)));
   return true;

@@ -56,11 +56,13 @@ inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
 inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return context.views[view].intensities(p.y + APRON, p.x + APRON);
 }
+using IntensityRow = const float*;
+inline IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return &context.views[view].intensities(p.y + APRON, p.x + APRON);
+}
+inline float intensity_in_row(IntensityRow row, int dx) { return row[dx]; }
 inline float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
   return &context.views[view].half_pixels(p.y + HALF_PIXEL_APRON, p.x + HALF_PIXEL_APRON);
-}
-inline float half_pixel_at(CONTEXT_ARGUMENT int view, ivec2 p) {
-  return *half_pixel_address(CONTEXT view, p);
 }
 inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   const float* top = half_pixel_address(CONTEXT view, p);

@@ -63,11 +63,13 @@ struct Algorithm {
   FN float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
     return __ldg(intensity_address(CONTEXT view, p));
   }
+  using IntensityRow = const float*;
+  FN IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return intensity_address(CONTEXT view, p);
+  }
+  FN float intensity_in_row(IntensityRow row, int dx) { return __ldg(row + dx); }
   FN float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
     return context.views[view].half_pixels + (p.y * context.views[view].half_pixel_stride + p.x);
-  }
-  FN float half_pixel_at(CONTEXT_ARGUMENT int view, ivec2 p) {
-    return __ldg(half_pixel_address(CONTEXT view, p));
   }
   FN vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
     const float* top = half_pixel_address(CONTEXT view, p);

@@ -10,8 +10,8 @@ namespace {
 // Counted by hand in the shaders' functions of these names; tests/kernel/work_test.cpp counts them
 // again by running the functions with numbers that count.
 constexpr int side_of_source = 21;  // a rotation, a scalar product and a sum
-constexpr int warp_ray_before_projection = 26;
-constexpr int is_ray = 5;  // a squared length, in warp_pixel()
+constexpr int warp_through = 18;
+constexpr int warp_ray_before_projection = 20;
 constexpr int map_row_affine = 8;
 constexpr int map_row_quadratic = 32;
 constexpr int map_offset_affine = 4;
@@ -20,7 +20,7 @@ constexpr int map_axis = 15;
 constexpr int slopes_in_texels = 4;
 constexpr int bends_in_texels = 6;
 constexpr int map_corners = 9;
-constexpr int weight_of_sample = 7;  // a product, growth() and a division
+constexpr int weight_of_sample = 7;  // two products, a sum, an eighth power and a division
 constexpr int zncc_cost = 15;        // and the visible share's limit
 
 /// Half pixels; in the memory of texture units they begin elsewhere.
@@ -32,12 +32,12 @@ int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) 
 /// Of project(); sources of several models count as pinholes, which take least.
 int projection(int model) {
   constexpr int common = 7;       // the length, and the field of view's limit
-  constexpr int perspective = 2;  // two divisions
+  constexpr int perspective = 3;  // a reciprocal and two products with it
   constexpr int decentring = 22;
   constexpr int radial = 6;
   constexpr int rational = 13;
   constexpr int prisms = 8;
-  constexpr int fisheye = 5;
+  constexpr int fisheye = 6;
   constexpr int radial_of_fisheye = 8;
   constexpr int of_angle = 2;  // its square, and the product with it
   constexpr int two_more_coefficients = 4;
@@ -183,12 +183,12 @@ PatchOperations patch_operations(const KernelConstants& c) {
   PatchOperations operations;
   operations.of_sample = weighting + (exact ? warp_ray + texel_at(c.filter) : map_offset) +
                          sample_image(c.filter) + sums;
-  operations.of_patch =
-      side_of_source + is_ray + warp_ray + texel_at(c.filter) + sample_image(c.filter) + zncc_cost;
+  operations.of_patch = side_of_source + warp_through + warp_ray + texel_at(c.filter) +
+                        sample_image(c.filter) + zncc_cost;
   if (!exact) {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;
-    operations.of_patch += anchors * (is_ray + warp_ray) + 2 * map_axis + texel_at(c.filter) +
+    operations.of_patch += anchors * warp_ray + 2 * map_axis + texel_at(c.filter) +
                            slopes_in_texels +
                            rows * (quadratic ? map_row_quadratic : map_row_affine);
   }

@@ -47,6 +47,7 @@ inline Number min(Number a, Number b) { return b < a ? b : a; }
 inline Number max(Number a, Number b) { return a < b ? b : a; }
 inline Number clamp(Number a, Number low, Number high) { return min(max(a, low), high); }
 
+using kernel::clamp;
 using kernel::cross;
 using kernel::dot;
 using kernel::ivec2;
@@ -99,6 +100,11 @@ inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
 inline Number intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return kernel::cpu::intensity_at(context.plain, view, p);
 }
+using kernel::cpu::IntensityRow;
+inline IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return kernel::cpu::intensity_row(context.plain, view, p);
+}
+inline Number intensity_in_row(IntensityRow row, int dx) { return row[dx]; }
 inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   counts.texels += 4;
   return numbers<vec4>(kernel::cpu::half_pixel_taps(context.plain, view, p));

@@ -166,12 +166,14 @@ TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
       const Eigen::Vector3f m =
           random_plane(random, Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>())
               .cast<float>();
-      const vec3 mk(m.x(), m.y(), m.z());
+      const kernel::cpu::PlaneWarp through =
+          kernel::cpu::warp_through(pair, vec3(m.x(), m.y(), m.z()));
       kernel::vec2 centre{};
       kernel::cpu::PatchMap map{};
-      if (!kernel::cpu::warp_pixel(context, pair, camera, camera.size.z, mk, pixel, centre))
+      if (!kernel::cpu::warp_pixel(context, through, camera, camera.size.z, pixel, centre)) {
         continue;
-      if (!kernel::cpu::map_patch(context, pair, camera, camera.size.z, mk, pixel, centre, map)) {
+      }
+      if (!kernel::cpu::map_patch(context, through, camera, camera.size.z, pixel, centre, map)) {
         continue;
       }
       double sum = 0;
@@ -181,7 +183,7 @@ TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
             kernel::cpu::map_row(context, map, -5, static_cast<float>(dy));
         for (int dx = -5; dx <= 5; ++dx) {
           kernel::vec2 exact{};
-          if (!kernel::cpu::warp_pixel(context, pair, camera, camera.size.z, mk,
+          if (!kernel::cpu::warp_pixel(context, through, camera, camera.size.z,
                                        ivec2(pixel.x + dx, pixel.y + dy), exact)) {
             continue;
           }
