@@ -150,22 +150,23 @@ struct Algorithm {
   }
 };
 
-// Blocks that a multiprocessor must be able to hold: with more ptxas spills registers, without a
-// bound it does so as well or takes so many that a block fewer fits (tools/cuda_kernel_report).
-constexpr int blocks_of_presets = 5;
-constexpr int blocks_of_any = 4;
+// Blocks that a multiprocessor must be able to hold, for one camera model and for any: with more
+// ptxas spills registers, without a bound it does so as well or takes so many that a block fewer
+// fits (tools/cuda_kernel_report).
+constexpr int blocks_of_one_model = 5;
+constexpr int blocks_of_any_model = 4;
 
-#define ENTRY_POINT_OF_BLOCKS(name, view, blocks)                                   \
-  template <class C>                                                                \
-  __global__ void __launch_bounds__(block_width* block_height,                      \
-                                    C::window_radius >= 0 ? blocks : blocks_of_any) \
-      name(const __grid_constant__ Context context) {                               \
-    ivec2 pixel;                                                                    \
-    if (Algorithm<C>::thread_pixel(context, view, pixel)) {                         \
-      Algorithm<C>::name##_pixel(context, pixel);                                   \
-    }                                                                               \
+#define ENTRY_POINT_OF_BLOCKS(name, view, blocks)                                        \
+  template <class C>                                                                     \
+  __global__ void __launch_bounds__(block_width* block_height,                           \
+                                    C::camera_model >= 0 ? blocks : blocks_of_any_model) \
+      name(const __grid_constant__ Context context) {                                    \
+    ivec2 pixel;                                                                         \
+    if (Algorithm<C>::thread_pixel(context, view, pixel)) {                              \
+      Algorithm<C>::name##_pixel(context, pixel);                                        \
+    }                                                                                    \
   }
-#define ENTRY_POINT(name, view) ENTRY_POINT_OF_BLOCKS(name, view, blocks_of_presets)
+#define ENTRY_POINT(name, view) ENTRY_POINT_OF_BLOCKS(name, view, blocks_of_one_model)
 
 ENTRY_POINT(initialise, REFERENCE)
 ENTRY_POINT(iterate, REFERENCE)
@@ -183,7 +184,7 @@ ENTRY_POINT(regress, REFERENCE)
 ENTRY_POINT(adopt, REFERENCE)
 ENTRY_POINT(fill, REFERENCE)
 ENTRY_POINT(adopt_fill, REFERENCE)
-ENTRY_POINT(vote, REFERENCE)
+ENTRY_POINT_OF_BLOCKS(vote, REFERENCE, 4)  // the planes that stand take registers
 ENTRY_POINT(transfer_keep, REFERENCE)
 ENTRY_POINT(renew, REFERENCE)
 ENTRY_POINT(interpolate, REFERENCE)
