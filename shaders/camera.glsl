@@ -105,7 +105,7 @@ FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
 FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
   real rho2 = point.x * point.x + point.y * point.y;
   real d = sqrt(rho2 + point.z * point.z);
-  bool inside = point.z > camera.domain.x * d;  // no zero vector
+  bool inside = point.z > camera.domain.x * d;  // false of the zero vector
   real x = real(0);
   real y = real(0);
   if (is_fisheye(model)) {

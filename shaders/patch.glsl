@@ -289,8 +289,9 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
         texel = map_offset(CONTEXT row, float(dx));
       }
       float b = sample_image(CONTEXT source, camera.size, texel);
+      // A texel that is no number may have an intensity that is none, which no weight makes zero.
       weight = seen && b >= 0.0f ? weight : 0.0f;
-      b -= start.centre_b;
+      b = seen ? b - start.centre_b : 0.0f;
       float weighted_a = weight * a;
       float weighted_b = weight * b;
       n += weight;
