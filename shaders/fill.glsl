@@ -39,7 +39,7 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec3 m = vec3(held.x, held.y, held.z);
     if (!admissible(CONTEXT ray, m)) continue;
     float weight =
-        1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q), intensity, inverse_scale));
+        1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
     int place = count;
     while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
       planes[place] = planes[place - 1];

@@ -42,13 +42,18 @@ FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
   return upper + (y - top) * (lower - upper);
 }
 
-// Projects the plane's point on one reference ray into a source; false where the plane is not in front, as on the zero
-// ray of a pixel that has none.
+// Projects the point in a direction of the source, at inverse distance w along a reference ray; false where it is not in
+// front, as on the zero ray of a pixel that has none.
+FN bool project_in_front(CameraParameters camera, int model, vec3 direction, float w, OUT(vec2) position) {
+  bool inside = project(camera, model, direction, position);
+  return inside && w > 0.0f;
+}
+
+// Projects the plane's point on one reference ray into a source; false where the plane is not in front.
 FN bool warp_ray(PlaneWarp warp, CameraParameters camera, int model, vec3 ray, OUT(vec2) position) {
   float w = dot(warp.m, ray);
   vec3 direction = vec3(dot(warp.row0, ray), dot(warp.row1, ray), dot(warp.row2, ray));
-  bool inside = project(camera, model, direction, position);
-  return inside && w > 0.0f;
+  return project_in_front(camera, model, direction, w, position);
 }
 
 FN bool warp_pixel(CONTEXT_ARGUMENT PlaneWarp warp, CameraParameters camera, int model, ivec2 pixel,
@@ -67,8 +72,8 @@ FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2
   vec2 position;
   q = ivec2(0, 0);
   float w = dot(m, ray);
-  bool inside = project(camera, model_of(CONTEXT camera), direction_in_source(pair, ray, w), position);
-  if (!inside || w <= 0.0f) return false;
+  vec3 direction = direction_in_source(pair, ray, w);
+  if (!project_in_front(camera, model_of(CONTEXT camera), direction, w, position)) return false;
   // Before the conversion, which is defined only for what an integer holds.
   if (!(position.x >= -0.5f && position.y >= -0.5f && position.x < float(camera.size.x) &&
         position.y < float(camera.size.y))) {
@@ -236,17 +241,17 @@ FN float eighth_power(float t) {
   return t * t;
 }
 
-// The eighth root of how unlike two intensities of the reference are, from 1 on: pixels of one surface mostly are
-// alike. `inverse_scale`: PARAMETERS.support.y, which loops read once.
-FN float root_of_unlikeness(float a, float b, float inverse_scale) {
-  return 1.0f + (0.125f * inverse_scale) * abs(a - b);
+// The eighth root of how unlike two intensities of the reference are, from 1 on, by their difference: pixels of one
+// surface mostly are alike. `inverse_scale`: of PARAMETERS.support, which loops read once.
+FN float root_of_unlikeness(float difference, float inverse_scale) {
+  return 1.0f + (0.125f * inverse_scale) * abs(difference);
 }
 
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
 // which loops read once. Zero for masked samples; others differ by 1 at most.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
   if (WEIGHTED == 0) return difference > -2.0f ? 1.0f : 0.0f;
-  return 1.0f / eighth_power(1.0f + (0.125f * inverse_scale) * abs(difference));
+  return 1.0f / eighth_power(root_of_unlikeness(difference, inverse_scale));
 }
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.

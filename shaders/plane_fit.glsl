@@ -73,7 +73,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float scale2 = min(2.0f * measure.x + twice_own, 2.0f * LARGEST_RESIDUAL * LARGEST_RESIDUAL);
       float doubt = scale2 + displacement * displacement;
       float remoteness = 1.0f + fall_off * (squared_dy + dx * dx);
-      float unlikeness = root_of_unlikeness(measure.w, own.w, inverse_scale);
+      float unlikeness = root_of_unlikeness(measure.w - own.w, inverse_scale);
       float trust = measure.y * scale2;
       float weight = trust * trust * (1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness)));
       if (measure.x >= UNMEASURED_VARIANCE) weight = 0.0f;

@@ -23,7 +23,7 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   if (side_of_source(pair, m) <= 0.0f) return false;
   float w = dot(m, unit_ray);
   vec3 direction = direction_in_source(pair, unit_ray, w);
-  if (!project(camera, model_of(CONTEXT camera), direction, position) || w <= 0.0f) return false;
+  if (!project_in_front(camera, model_of(CONTEXT camera), direction, w, position)) return false;
   if (!(position.x > -1.0f && position.y > -1.0f && position.x < float(camera.size.x) &&
         position.y < float(camera.size.y))) {
     return false;

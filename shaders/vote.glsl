@@ -106,7 +106,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         float w = inverse_distance_of(plane, ray);
         float weight =
             1.0f / eighth_power(root_of_growth(float(dx * dx + dy * dy) * fall_off) *
-                                root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q), intensity, inverse_scale));
+                                root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
         most += weight * support_between(w, own, scale);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
           support[i] += weight * support_between(w, candidates[i], scale);

@@ -53,14 +53,14 @@ inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return to_vec4(context.views[view].rays(p.y, p.x));
 }
-inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
-  return context.views[view].intensities(p.y + APRON, p.x + APRON);
-}
 using IntensityRow = const float*;
 inline IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
   return &context.views[view].intensities(p.y + APRON, p.x + APRON);
 }
 inline float intensity_in_row(IntensityRow row, int dx) { return row[dx]; }
+inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return *intensity_row(CONTEXT view, p);
+}
 inline float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
   return &context.views[view].half_pixels(p.y + HALF_PIXEL_APRON, p.x + HALF_PIXEL_APRON);
 }
