@@ -67,18 +67,26 @@ double upper_median(std::vector<double>& values) {
   return *middle;
 }
 
+/// Calls function(view), which must not throw, for all views at once.
+template <typename Function>
+void for_each_view(std::size_t views, const Function& function) {
+  cv::parallel_for_(cv::Range(0, static_cast<int>(views)), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) function(static_cast<std::size_t>(i));
+  });
+}
+
 /// Accepted points on a regular grid, in the rig's frame.
-std::vector<Point> accepted_points(const View& view, const cv::Mat& rays,
-                                   const ViewResult& matched) {
+std::vector<Point> accepted_points(const View& view, const ViewResult& matched) {
   std::vector<Point> points;
+  const PreparedCamera camera(view.camera);
   const double pixels = static_cast<double>(matched.hypotheses.total());
   const int step = std::max(1, static_cast<int>(std::sqrt(pixels / points_per_view)));
   for (int y = step / 2; y < matched.hypotheses.rows; y += step) {
     for (int x = step / 2; x < matched.hypotheses.cols; x += step) {
       if (matched.reasons.at<std::uint16_t>(y, x) != 0) continue;
+      Eigen::Vector3d ray;
+      if (!camera.unproject({x, y}, ray)) continue;
       const auto& plane = matched.hypotheses.at<cv::Vec4f>(y, x);
-      const auto& r = rays.at<cv::Vec4f>(y, x);
-      const Eigen::Vector3d ray = Eigen::Vector3f(r[0], r[1], r[2]).cast<double>();
       const double w = Eigen::Vector3f(plane[0], plane[1], plane[2]).cast<double>().dot(ray);
       if (w > 0) points.push_back({view.world_from_camera * (ray / w), {x, y}});
     }
@@ -164,41 +172,42 @@ class Alignment {
     return upper_median(distances);
   }
 
-  std::vector<Row> rows(const std::vector<BlurredView>& views) const {
+  std::vector<Row> rows_of(std::size_t i, const BlurredView& view) const {
     std::vector<Row> rows;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const BlurredView& view = views[i];
-      const Eigen::Isometry3d camera_from_rig = rig_.views[i].world_from_camera.inverse();
-      const PreparedCamera camera(rig_.views[i].camera);
-      for (const Point& point : points_[i]) {
-        if (view.usable(point.pixel) == 0) continue;
-        const Eigen::Vector3d moved = motion_ * point.position;
-        Eigen::Vector2d pixel;
-        Eigen::Matrix<double, 2, 3> jacobian;
-        if (!camera.project(camera_from_rig * moved, pixel, jacobian)) continue;
-        if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < view.now.cols - 1 &&
-              pixel.y() < view.now.rows - 1) ||
-            view.usable(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5)) ==
-                0) {
-          continue;
-        }
-        const cv::Vec3f seen = bilinear(view.now, pixel);
-        const double intensity = static_cast<double>(view.previous(point.pixel));
-        const Eigen::RowVector3d by_point = Eigen::RowVector2f(seen[1], seen[2]).cast<double>() *
-                                            jacobian * camera_from_rig.linear();
-        Row& row = rows.emplace_back();
-        row.residual =
-            static_cast<double>(seen[0]) - brightness_[i][0] * intensity - brightness_[i][1];
-        row.by_motion << -by_point * cross_matrix(moved), by_point;
-        row.intensity = intensity;
-        row.view = i;
+    const Eigen::Isometry3d camera_from_rig = rig_.views[i].world_from_camera.inverse();
+    const PreparedCamera camera(rig_.views[i].camera);
+    for (const Point& point : points_[i]) {
+      if (view.usable(point.pixel) == 0) continue;
+      const Eigen::Vector3d moved = motion_ * point.position;
+      Eigen::Vector2d pixel;
+      Eigen::Matrix<double, 2, 3> jacobian;
+      if (!camera.project(camera_from_rig * moved, pixel, jacobian)) continue;
+      if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < view.now.cols - 1 &&
+            pixel.y() < view.now.rows - 1) ||
+          view.usable(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5)) == 0) {
+        continue;
       }
+      const cv::Vec3f seen = bilinear(view.now, pixel);
+      const double intensity = static_cast<double>(view.previous(point.pixel));
+      const Eigen::RowVector3d by_point =
+          Eigen::RowVector2f(seen[1], seen[2]).cast<double>() * jacobian * camera_from_rig.linear();
+      Row& row = rows.emplace_back();
+      row.residual =
+          static_cast<double>(seen[0]) - brightness_[i][0] * intensity - brightness_[i][1];
+      row.by_motion << -by_point * cross_matrix(moved), by_point;
+      row.intensity = intensity;
+      row.view = i;
     }
     return rows;
   }
 
   Normals linearise(const std::vector<BlurredView>& views) const {
-    const std::vector<Row> all = rows(views);
+    std::vector<std::vector<Row>> of_views(views.size());
+    for_each_view(views.size(), [&](std::size_t i) { of_views[i] = rows_of(i, views[i]); });
+    std::vector<Row> all;
+    for (const std::vector<Row>& of_view : of_views) {
+      all.insert(all.end(), of_view.begin(), of_view.end());
+    }
     const Eigen::Index unknowns = 6 + 2 * static_cast<Eigen::Index>(views.size());
     Normals normals;
     normals.points = all.size();
@@ -285,25 +294,29 @@ std::optional<Eigen::Isometry3d> estimate_motion(const Rig& rig,
                                                  const std::vector<ViewResult>& previous,
                                                  const std::vector<cv::Mat>& images) {
   require_sizes(rig, previous_images, previous, images);
-  std::vector<std::vector<Point>> points;
-  std::vector<cv::Mat> usable;
-  std::vector<std::array<cv::Mat, 2>> intensities;
-  for (std::size_t i = 0; i < rig.views.size(); ++i) {
-    const View& view = rig.views[i];
-    const cv::Mat rays = ray_image(view.camera, view.mask);
-    cv::Mat valid;
-    cv::extractChannel(rays, valid, 3);
-    usable.push_back(valid > 0);
-    points.push_back(accepted_points(view, rays, previous[i]));
-    intensities.push_back({to_intensity(previous_images[i], "The previous image of " + view.name),
-                           to_intensity(images[i], "The image of " + view.name)});
+  const std::size_t count = rig.views.size();
+  std::vector<std::vector<Point>> points(count);
+  std::vector<cv::Mat> usable(count);
+  std::vector<std::array<cv::Mat, 2>> intensities(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::string& name = rig.views[i].name;
+    intensities[i] = {to_intensity(previous_images[i], "The previous image of " + name),
+                      to_intensity(images[i], "The image of " + name)};
   }
+  for_each_view(count, [&](std::size_t i) {
+    const cv::Mat& reasons = previous[i].reasons;
+    usable[i] = cv::Mat(reasons.size(), CV_8UC1);
+    std::transform(
+        reasons.begin<std::uint16_t>(), reasons.end<std::uint16_t>(), usable[i].begin<uchar>(),
+        [](std::uint16_t all) { return (all & reason_no_ray) == 0 ? uchar{255} : uchar{0}; });
+    points[i] = accepted_points(rig.views[i], previous[i]);
+  });
   Alignment alignment(rig, std::move(points));
-  std::vector<BlurredView> views(rig.views.size());
+  std::vector<BlurredView> views(count);
   for (const double blur : blurs) {
-    for (std::size_t i = 0; i < views.size(); ++i) {
+    for_each_view(count, [&](std::size_t i) {
       views[i] = blurred(intensities[i][0], intensities[i][1], usable[i], blur);
-    }
+    });
     alignment.refine(views);
   }
   if (!alignment.is_determined(views)) return std::nullopt;
