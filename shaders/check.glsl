@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What is known about a pixel once all views have planes: agreement with the sources' own planes and with the
-// surroundings, texture, ambiguity, parallax and tilt, summed up as reasons for rejection and a confidence.
+// surroundings, texture, parallax and tilt, summed up as reasons for rejection and a confidence.
 
 // The surroundings of a pixel: a sparse grid of this radius and step.
 #define SUPPORT_RADIUS 20
@@ -80,22 +80,6 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   return vec2(supporting * share, (EVIDENCE_SCALE * evidence) * share);
 }
 
-// Whether the patch matches better by more than the margin at one of PASS.places places: 2, 4, 8 ... source
-// pixels away to either side.
-FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, float speed) {
-  float margin = PARAMETERS.support.z;
-  if (speed <= 0.0f) return false;
-  vec3 m = vec3(held.x, held.y, held.z);
-  float w = dot(m, ray);
-  for (int i = 0; i < PASS.places; ++i) {
-    float pixels = float(2 << (i >> 1));
-    float there = w + ((i & 1) == 0 ? pixels : -pixels) / speed;
-    if (there < PARAMETERS.range.z || there > PARAMETERS.range.w) continue;
-    if (patch_cost(CONTEXT pixel, (there / w) * m) < held.w - margin) return true;
-  }
-  return false;
-}
-
 // Probability that the point lies within two source pixels of its true place: a logistic model of the
 // displacement from the source's own plane (px), the support of the surroundings and the variance of intensity
 // that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md). Where next to nothing matches
@@ -139,7 +123,6 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       reasons |= REASON_INCONSISTENT;
     }
     if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
-    if (is_ambiguous(CONTEXT pixel, ray, held, speed)) reasons |= REASON_AMBIGUOUS;
     confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
                                variance * min(held.w, 1.0f), support.y);
   }

@@ -67,10 +67,8 @@
 #define CANDIDATE_SURROUNDINGS 12
 #define CANDIDATE_SOURCE_PLANE 13
 
-// Bits of PassParameters.candidates of other kernels: see intensity_between(), measure_pixel(), regress_plane() and
-// adopt_pixel().
+// Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane() and adopt_pixel().
 #define INTERPOLATE_CUBIC 1u
-#define SUBPIXEL_MATCH 1u
 #define REGRESS_NORMALS 1u
 #define ADOPT_UNSEEN 2u
 #define HELD_UNSEEN 4u
@@ -116,14 +114,13 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last, which a view that is lower than others does not reach
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
-                    // measuring: SUBPIXEL_MATCH; regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN, HELD_UNSEEN;
-                    // filling: reasons not to fill
+                    // regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN, HELD_UNSEEN; filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels
   int steps;          // sweep: inverse distances; regression: of its grid of neighbours, in the radius
   float deviation;    // regression: standard deviation (source pixels) that is enough; 0: normals only
-  int places;         // check: other places tried for a better match
+  int places;         // ambiguity: other places tried for a better match
 };
 
 // Push constants after those, where an application's image is read or map is written (Vulkan).

@@ -38,7 +38,9 @@ constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
     kernel::cpu::vote_pixel,
     kernel::cpu::transfer_keep_pixel,
     kernel::cpu::renew_pixel,
-    kernel::cpu::interpolate_pixel};
+    kernel::cpu::interpolate_pixel,
+    kernel::cpu::subpixel_pixel,
+    kernel::cpu::ambiguity_pixel};
 
 class CpuBackend final : public Backend {
  public:

@@ -134,10 +134,12 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
 #include "measure.glsl"
+#include "subpixel.glsl"
 #include "plane_fit.glsl"
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"
+#include "ambiguity.glsl"
 #include "fill.glsl"
 #include "vote.glsl"
 // clang-format on

@@ -132,10 +132,12 @@ struct Algorithm {
 #include "adaptive_search.glsl"
 #include "consistency.glsl"
 #include "measure.glsl"
+#include "subpixel.glsl"
 #include "plane_fit.glsl"
 #include "regression.glsl"
 #include "transfer.glsl"
 #include "check.glsl"
+#include "ambiguity.glsl"
 #include "fill.glsl"
 #include "vote.glsl"
   // clang-format on
@@ -174,7 +176,7 @@ ENTRY_POINT(transfer_clear, REFERENCE)
 ENTRY_POINT(transfer_nearest, OTHER)
 ENTRY_POINT(transfer_winner, OTHER)
 ENTRY_POINT(transfer_gather, REFERENCE)
-ENTRY_POINT_OF_BLOCKS(check, REFERENCE, 1)
+ENTRY_POINT(check, REFERENCE)
 ENTRY_POINT(downsample, REFERENCE)
 ENTRY_POINT(sweep, REFERENCE)
 ENTRY_POINT(upsample, REFERENCE)
@@ -188,6 +190,8 @@ ENTRY_POINT_OF_BLOCKS(vote, REFERENCE, 4)  // the planes that stand take registe
 ENTRY_POINT(transfer_keep, REFERENCE)
 ENTRY_POINT(renew, REFERENCE)
 ENTRY_POINT(interpolate, REFERENCE)
+ENTRY_POINT(subpixel, REFERENCE)
+ENTRY_POINT(ambiguity, REFERENCE)
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}
@@ -216,11 +220,11 @@ KernelTable for_model(int camera_model, Get get) {
 struct PyramidKernels {
   template <class C>
   KernelTable operator()(C) const {
-    static const KernelEntry entries[] = {KERNEL_ENTRY(sweep, C),   KERNEL_ENTRY(upsample, C),
-                                          KERNEL_ENTRY(search, C),  KERNEL_ENTRY(measure, C),
-                                          KERNEL_ENTRY(regress, C), KERNEL_ENTRY(adopt, C),
-                                          KERNEL_ENTRY(check, C),   KERNEL_ENTRY(adopt_fill, C),
-                                          KERNEL_ENTRY(vote, C),    KERNEL_ENTRY(renew, C)};
+    static const KernelEntry entries[] = {
+        KERNEL_ENTRY(sweep, C),   KERNEL_ENTRY(upsample, C),   KERNEL_ENTRY(search, C),
+        KERNEL_ENTRY(measure, C), KERNEL_ENTRY(regress, C),    KERNEL_ENTRY(adopt, C),
+        KERNEL_ENTRY(check, C),   KERNEL_ENTRY(adopt_fill, C), KERNEL_ENTRY(vote, C),
+        KERNEL_ENTRY(renew, C),   KERNEL_ENTRY(subpixel, C),   KERNEL_ENTRY(ambiguity, C)};
     return table_of(entries);
   }
 };

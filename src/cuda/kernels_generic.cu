@@ -24,7 +24,9 @@ KernelTable generic_kernels() {
                                         KERNEL_ENTRY(vote, C),
                                         KERNEL_ENTRY(transfer_keep, C),
                                         KERNEL_ENTRY(renew, C),
-                                        KERNEL_ENTRY(interpolate, C)};
+                                        KERNEL_ENTRY(interpolate, C),
+                                        KERNEL_ENTRY(subpixel, C),
+                                        KERNEL_ENTRY(ambiguity, C)};
   return table_of(entries);
 }
 

@@ -167,8 +167,9 @@ class Builder {
   }
 
   Schedule finished() {
-    check_and_fill(options_.ambiguity_margin > 0 ? other_places : 0, options_.fill_radius,
-                   reason_no_ray);
+    check();
+    if (options_.ambiguity_margin > 0) find_ambiguity();
+    fill(options_.fill_radius, reason_no_ray);
     return std::move(schedule_);
   }
 
@@ -209,7 +210,8 @@ class Builder {
         // Where a launch of one view fills a GPU, views are measured against the ones before that
         // are regressed already: they agree better.
         for (const Views views : launches(level, level > 0 ? at_once : one_by_one)) {
-          measure(views, i == 0 && options_.subpixel_match ? SUBPIXEL_MATCH : 0);
+          measure(views);
+          if (i == 0 && options_.subpixel_match) match_subpixel(views);
           regress(views, precision_of_round(i), level == 0 ? until_vote() : 0);
         }
         if (level > 0) continue;
@@ -218,7 +220,7 @@ class Builder {
       }
     }
     if (options_.level_regressions.back() > 0) {
-      measure(views_of(0), 0);
+      measure(views_of(0));
       regress(views_of(0), 0, 0);
     }
   }
@@ -314,7 +316,7 @@ class Builder {
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
-    measure(views_of(0), 0);
+    measure(views_of(0));
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const bool last = i + 1 == options_.warm_regressions;
       const unsigned how =
@@ -402,13 +404,10 @@ class Builder {
     return std::max(options_.regression_precision * std::pow(share, i), finest);
   }
 
-  /// `how` of measure() and regress(): see shaders/measure.glsl and regression.glsl.
-  void measure(Views views, unsigned how) {
-    kernel::PassParameters pass = pass_of(views);
-    pass.candidates = how;
-    // A sub-pixel match looks at the source that tells most.
-    add_with_patches(Kernel::measure, pass, views, (how & SUBPIXEL_MATCH) != 0 ? 1 : 0);
-  }
+  void measure(Views views) { add(Kernel::measure, pass_of(views), views, 0); }
+
+  /// In the source that tells most.
+  void match_subpixel(Views views) { add_with_patches(Kernel::subpixel, pass_of(views), views, 1); }
 
   /// Planes that were regressed in the frame before need fewer neighbours.
   int warm_regression_steps() const {
@@ -416,7 +415,8 @@ class Builder {
     return std::max(std::min(options_.regression_steps, fewest), options_.regression_steps / 2);
   }
 
-  /// The views must have been measured. `precision`: 0 leaves the distances as they are.
+  /// The views must have been measured. `precision`: 0 leaves the distances as they are; `how`: see
+  /// shaders/regression.glsl.
   void regress(Views views, double precision, unsigned how) {
     regress(views, precision, how, options_.regression_steps);
   }
@@ -454,13 +454,19 @@ class Builder {
     add(Kernel::adopt, pass, views_of(0), 1);
   }
 
-  /// Checks every view, then fills: filled planes must not count as a source's own.
-  void check_and_fill(int places, int fill_radius, unsigned reasons_not_to_fill) {
+  void check() { add(Kernel::check, pass_of(views_of(0)), views_of(0), 0); }
+
+  void find_ambiguity() {
     kernel::PassParameters pass = pass_of(views_of(0));
-    pass.places = places;
-    add(Kernel::check, pass, views_of(0), places);
-    if (fill_radius == 0) return;
-    pass.radius = fill_radius;
+    pass.places = 6;
+    add(Kernel::ambiguity, pass, views_of(0), pass.places);
+  }
+
+  /// All views must have been checked: filled planes must not count as a source's own.
+  void fill(int radius, unsigned reasons_not_to_fill) {
+    if (radius == 0) return;
+    kernel::PassParameters pass = pass_of(views_of(0));
+    pass.radius = radius;
     pass.candidates = reasons_not_to_fill;
     add(Kernel::fill, pass, views_of(0), 0);
     add(Kernel::adopt_fill, pass, views_of(0), 1);
@@ -469,10 +475,10 @@ class Builder {
   /// Lets pixels that fail the checks try the planes around them.
   void repair() {
     if (options_.repair_radius == 0) return;
-    check_and_fill(0, options_.repair_radius, reason_no_ray | reason_no_overlap);
+    check();
+    fill(options_.repair_radius, reason_no_ray | reason_no_overlap);
   }
 
-  static constexpr int other_places = 6;
   const Options& options_;
   int levels_ = 1;
   int views_of_rig_ = 2;
@@ -512,7 +518,9 @@ const char* to_string(Kernel kernel) {
                                                                   "vote",
                                                                   "transfer_keep",
                                                                   "renew",
-                                                                  "interpolate"};
+                                                                  "interpolate",
+                                                                  "subpixel",
+                                                                  "ambiguity"};
   return names[static_cast<std::size_t>(kernel)];
 }
 

@@ -34,8 +34,10 @@ enum class Kernel {
   transfer_keep,     ///< keeps a view's own planes, moved on from the previous frame
   renew,             ///< starts a view from those
   interpolate,       ///< intensities of a view at half pixels
+  subpixel,          ///< moves what was measured to where each patch matches best
+  ambiguity,         ///< adds to the checks where another place matches better
 };
-inline constexpr int kernel_count = 21;
+inline constexpr int kernel_count = 23;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).

@@ -109,7 +109,6 @@ struct Traffic {
 Traffic traffic_of(const Dispatch& dispatch) {
   constexpr unsigned seen = ray | intensity;
   const bool patches = dispatch.samples > 0;
-  const unsigned in_sources = patches ? static_cast<unsigned>(half_pixels) : 0;
   switch (dispatch.kernel) {
     case Kernel::initialise:
       return {seen, half_pixels, plane};
@@ -126,7 +125,9 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::transfer_gather:
       return {seen | winner | plane, half_pixels, plane};
     case Kernel::check:
-      return {seen | plane, plane | in_sources, checks};
+      return {seen | plane, plane, checks};
+    case Kernel::ambiguity:
+      return {seen | plane | checks, half_pixels, checks};
     case Kernel::interpolate:
       return {intensity, 0, half_pixels};
     case Kernel::downsample:
@@ -138,7 +139,9 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::search:
       return {seen | plane, half_pixels, half_of_planes};
     case Kernel::measure:
-      return {seen | half_pixels | plane, plane | in_sources, checks};
+      return {seen | half_pixels | plane, plane, checks};
+    case Kernel::subpixel:
+      return {seen | half_pixels | plane | checks, half_pixels, checks};
     case Kernel::regress:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:

@@ -42,8 +42,8 @@ class Measure : public ::testing::Test {
   }
 
   /// Pixels in the source between where the wall is and where the measure puts it, of a plane held
-  /// `held` pixels off, over the middle of the image.
-  std::vector<double> measured(double held, unsigned how) {
+  /// `held` pixels off, over the middle of the image; `matched`: after a sub-pixel match, too.
+  std::vector<double> measured(double held, bool matched) {
     std::vector<double> all;
     for (int y = 24; y < size - 24; y += step) {
       for (int x = 24; x < size - 24; x += step) {
@@ -55,11 +55,11 @@ class Measure : public ::testing::Test {
           kernel::cpu::measure_pixel(fixture_.context(), {x, y});
           return fixture_.view(0).checks(y, x);
         };
-        fixture_.pass().candidates = 0;
         const double speed = measure(wall_)[1];
         if (speed <= 0) continue;
-        fixture_.pass().candidates = how;
-        const cv::Vec4f check = measure(wall_ + held / speed * ray);
+        measure(wall_ + held / speed * ray);
+        if (matched) kernel::cpu::subpixel_pixel(fixture_.context(), {x, y});
+        const cv::Vec4f check = fixture_.view(0).checks(y, x);
         all.push_back((static_cast<double>(check[2]) - wall_.dot(ray)) * speed);
       }
     }
@@ -79,8 +79,8 @@ class Measure : public ::testing::Test {
 TEST_F(Measure, SubpixelMatchFindsWherePatchesMatch) {
   change_exposure(0.6, 0.1);
   for (const double held : {-0.3, 0.15, 0.3}) {
-    const auto as_held = measured(held, 0);
-    const auto matched = measured(held, SUBPIXEL_MATCH);
+    const auto as_held = measured(held, false);
+    const auto matched = measured(held, true);
     ASSERT_GT(matched.size(), 500u);
     EXPECT_NEAR(root_mean_square(as_held), std::abs(held), 0.01);
     EXPECT_LT(root_mean_square(matched), 0.08) << "held " << held << " px off";
@@ -89,17 +89,17 @@ TEST_F(Measure, SubpixelMatchFindsWherePatchesMatch) {
 
 TEST_F(Measure, SubpixelMatchNeedsEvidence) {
   change_exposure(-0.6, 0.9);
-  EXPECT_NEAR(root_mean_square(measured(0.3, SUBPIXEL_MATCH)), 0.3, 0.01) << "a negative";
+  EXPECT_NEAR(root_mean_square(measured(0.3, true)), 0.3, 0.01) << "a negative";
   for (int i = 0; i < 2; ++i) {
     cv::Mat image = fixture_.view(i).image();
     image.setTo(0.5, image >= 0);
   }
   fixture_.interpolate();
-  EXPECT_NEAR(root_mean_square(measured(0.3, SUBPIXEL_MATCH)), 0.3, 0.01) << "no texture";
+  EXPECT_NEAR(root_mean_square(measured(0.3, true)), 0.3, 0.01) << "no texture";
 }
 
 TEST_F(Measure, SubpixelMatchMovesNoFurtherThanAPatchCanTell) {
-  for (const double displacement : measured(3, SUBPIXEL_MATCH)) {
+  for (const double displacement : measured(3, true)) {
     EXPECT_NEAR(displacement, 3, static_cast<double>(LARGEST_SHIFT) + 0.1);
   }
 }

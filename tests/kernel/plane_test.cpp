@@ -315,16 +315,19 @@ TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   options.ambiguity_margin = 0.2;
   AgreeingViews views(options);
   views.fixture.pass().places = 6;
-  const auto check_at_cost = [&](double cost) {
+  const auto added_at_cost = [&](double cost, int places) {
     const vec3 m = views.plane(0);
     views.fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, cost));
-    return views.reasons({48, 48}) & REASON_AMBIGUOUS;
+    views.fixture.pass().places = places;
+    const int before = views.reasons({48, 48});
+    kernel::cpu::ambiguity_pixel(views.fixture.context(), {48, 48});
+    return static_cast<int>(views.fixture.view(0).checks(48, 48)[3]) - before;
   };
   // Unrelated images: some other place always matches much better than the worst cost.
-  EXPECT_NE(check_at_cost(1.9), 0);
-  EXPECT_EQ(check_at_cost(0.1), 0);
-  views.fixture.pass().places = 0;
-  EXPECT_EQ(check_at_cost(1.9), 0) << "not asked for";
+  EXPECT_EQ(added_at_cost(1.9, 6), REASON_AMBIGUOUS);
+  EXPECT_EQ(added_at_cost(0.1, 6), 0);
+  EXPECT_EQ(added_at_cost(1.9, 0), 0) << "nowhere else";
+  EXPECT_EQ(added_at_cost(2, 6), 0) << "no plane";
 }
 
 TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {

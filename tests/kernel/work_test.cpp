@@ -138,17 +138,17 @@ TEST(Work, OfASubPixelMatchIsAPatchInOneSource) {
   const Schedule schedule = make_schedule(rig, Options::preset_named("fast"));
   const KernelConstants& constants = schedule.constants;
   const long long samples = samples_of_patch(constants.window_radius, constants.pattern);
-  int measures = 0;
+  int matches = 0;
   for (const Dispatch& dispatch : schedule.dispatches) {
-    if (dispatch.kernel == Kernel::measure && dispatch.samples > 0) {
+    if (dispatch.kernel == Kernel::subpixel) {
       EXPECT_EQ(dispatch.samples, dispatch.pixels * samples);
-      measures += dispatch.views;
+      matches += dispatch.views;
     }
     if (dispatch.kernel == Kernel::sweep) {
       EXPECT_EQ(dispatch.samples % (2 * dispatch.pixels * samples), 0);
     }
   }
-  EXPECT_EQ(measures, 3 * 3) << "one for each view and level";
+  EXPECT_EQ(matches, 3 * 3) << "one for each view and level";
 }
 
 }  // namespace
