@@ -70,8 +70,7 @@
 // Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane() and adopt_pixel().
 #define INTERPOLATE_CUBIC 1u
 #define REGRESS_NORMALS 1u
-#define ADOPT_UNSEEN 2u
-#define HELD_UNSEEN 4u
+#define HELD_UNSEEN 2u
 
 // Of the plane regression: the round, from 0 on, that first asks a whole neighbourhood, each before it half the next
 // one; the smallest radius (pixels) that a plane is fitted to; the variance (px^2) of what was not measured.
@@ -114,7 +113,7 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last, which a view that is lower than others does not reach
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
-                    // regression: REGRESS_NORMALS; adopting: ADOPT_UNSEEN, HELD_UNSEEN; filling: reasons not to fill
+                    // regression: REGRESS_NORMALS; adopting: HELD_UNSEEN; filling: reasons not to fill
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels

@@ -83,9 +83,24 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_prior(CONTEXT REFERENCE, pixel, prior);
 }
 
-// Takes the prior over as the pixel's plane, where it can be seen in a source. With ADOPT_UNSEEN only its point must
-// be seen: the cost stays and the measure follows, for another regression that needs no new one. With HELD_UNSEEN the
-// plane that the pixel holds came like that: where it stays it gets a cost of its own, of no information at most.
+// Takes the prior over as the pixel's plane where a source sees its point, whatever it sees of the patch: the cost stays
+// and the measure follows, for another regression or a vote, which need no new one.
+FN void adopt_point_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
+  vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
+  vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
+  vec3 m = vec3(prior.x, prior.y, prior.z);
+  if (held.w >= INVALID_COST || prior.w == 0.0f || !in_some_source(CONTEXT unit_ray, m)) return;
+  vec4 adopted = vec4(m, held.w);
+  store_hypothesis(CONTEXT REFERENCE, pixel, adopted);
+  vec4 measure = check_at(CONTEXT REFERENCE, pixel);
+  measure.z = inverse_distance_of(adopted, unit_ray);
+  store_check(CONTEXT REFERENCE, pixel, measure);
+}
+
+// Takes the prior over as the pixel's plane, where it can be seen in a source. With HELD_UNSEEN the plane that the pixel
+// holds came by adopt_point_pixel(): where it stays it gets a cost of its own, of no information at most.
 FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
@@ -93,17 +108,6 @@ FN void adopt_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   if (held.w >= INVALID_COST || (prior.w == 0.0f && !held_unseen)) return;
   vec3 own = vec3(held.x, held.y, held.z);
   vec3 m = prior.w != 0.0f ? vec3(prior.x, prior.y, prior.z) : own;
-  if ((PASS.candidates & ADOPT_UNSEEN) != 0u) {
-    vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
-    vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
-    if (prior.w == 0.0f || !in_some_source(CONTEXT unit_ray, m)) return;
-    vec4 adopted = vec4(m, held.w);
-    store_hypothesis(CONTEXT REFERENCE, pixel, adopted);
-    vec4 measure = check_at(CONTEXT REFERENCE, pixel);
-    measure.z = inverse_distance_of(adopted, unit_ray);
-    store_check(CONTEXT REFERENCE, pixel, measure);
-    return;
-  }
   // A loop over both planes: the cost function is then compiled once.
   float cost = INVALID_COST;
   for (int i = 0; i < 2; ++i) {

@@ -40,7 +40,8 @@ constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
     kernel::cpu::renew_pixel,
     kernel::cpu::interpolate_pixel,
     kernel::cpu::subpixel_pixel,
-    kernel::cpu::ambiguity_pixel};
+    kernel::cpu::ambiguity_pixel,
+    kernel::cpu::adopt_point_pixel};
 
 class CpuBackend final : public Backend {
  public:

@@ -192,6 +192,7 @@ ENTRY_POINT(renew, REFERENCE)
 ENTRY_POINT(interpolate, REFERENCE)
 ENTRY_POINT(subpixel, REFERENCE)
 ENTRY_POINT(ambiguity, REFERENCE)
+ENTRY_POINT(adopt_point, REFERENCE)
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}
@@ -221,10 +222,11 @@ struct PyramidKernels {
   template <class C>
   KernelTable operator()(C) const {
     static const KernelEntry entries[] = {
-        KERNEL_ENTRY(sweep, C),   KERNEL_ENTRY(upsample, C),   KERNEL_ENTRY(search, C),
-        KERNEL_ENTRY(measure, C), KERNEL_ENTRY(regress, C),    KERNEL_ENTRY(adopt, C),
-        KERNEL_ENTRY(check, C),   KERNEL_ENTRY(adopt_fill, C), KERNEL_ENTRY(vote, C),
-        KERNEL_ENTRY(renew, C),   KERNEL_ENTRY(subpixel, C),   KERNEL_ENTRY(ambiguity, C)};
+        KERNEL_ENTRY(sweep, C),      KERNEL_ENTRY(upsample, C),   KERNEL_ENTRY(search, C),
+        KERNEL_ENTRY(measure, C),    KERNEL_ENTRY(regress, C),    KERNEL_ENTRY(adopt, C),
+        KERNEL_ENTRY(check, C),      KERNEL_ENTRY(adopt_fill, C), KERNEL_ENTRY(vote, C),
+        KERNEL_ENTRY(renew, C),      KERNEL_ENTRY(subpixel, C),   KERNEL_ENTRY(ambiguity, C),
+        KERNEL_ENTRY(adopt_point, C)};
     return table_of(entries);
   }
 };

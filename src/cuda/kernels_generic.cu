@@ -26,7 +26,8 @@ KernelTable generic_kernels() {
                                         KERNEL_ENTRY(renew, C),
                                         KERNEL_ENTRY(interpolate, C),
                                         KERNEL_ENTRY(subpixel, C),
-                                        KERNEL_ENTRY(ambiguity, C)};
+                                        KERNEL_ENTRY(ambiguity, C),
+                                        KERNEL_ENTRY(adopt_point, C)};
   return table_of(entries);
 }
 

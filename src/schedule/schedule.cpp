@@ -212,7 +212,7 @@ class Builder {
         for (const Views views : launches(level, level > 0 ? at_once : one_by_one)) {
           measure(views);
           if (i == 0 && options_.subpixel_match) match_subpixel(views);
-          regress(views, precision_of_round(i), level == 0 ? until_vote() : 0);
+          regress(views, precision_of_round(i), 0, level == 0 ? until_vote() : Kernel::adopt);
         }
         if (level > 0) continue;
         repair();
@@ -221,7 +221,7 @@ class Builder {
     }
     if (options_.level_regressions.back() > 0) {
       measure(views_of(0));
-      regress(views_of(0), 0, 0);
+      regress(views_of(0), 0, 0, Kernel::adopt);
     }
   }
 
@@ -319,9 +319,9 @@ class Builder {
     measure(views_of(0));
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const bool last = i + 1 == options_.warm_regressions;
-      const unsigned how =
-          (last ? REGRESS_NORMALS | until_vote() : ADOPT_UNSEEN) | (i > 0 ? HELD_UNSEEN : 0);
-      regress(views_of(0), precision_of_round(i), how, warm_regression_steps());
+      const unsigned how = (last ? REGRESS_NORMALS : 0) | (i > 0 ? HELD_UNSEEN : 0);
+      regress(views_of(0), precision_of_round(i), how, last ? until_vote() : Kernel::adopt_point,
+              warm_regression_steps());
     }
     repair();
     vote();
@@ -415,14 +415,14 @@ class Builder {
     return std::max(std::min(options_.regression_steps, fewest), options_.regression_steps / 2);
   }
 
-  /// The views must have been measured. `precision`: 0 leaves the distances as they are; `how`: see
-  /// shaders/regression.glsl.
-  void regress(Views views, double precision, unsigned how) {
-    regress(views, precision, how, options_.regression_steps);
+  /// The views must have been measured. `precision`: 0 leaves the distances as they are; `how`, and
+  /// the kernel that adopts the planes: see shaders/regression.glsl.
+  void regress(Views views, double precision, unsigned how, Kernel adopt) {
+    regress(views, precision, how, adopt, options_.regression_steps);
   }
 
   /// `steps`: of the grid of neighbours.
-  void regress(Views views, double precision, unsigned how, int steps) {
+  void regress(Views views, double precision, unsigned how, Kernel adopt, int steps) {
     kernel::PassParameters pass = pass_of(views);
     pass.iteration = ++regressions_;
     // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
@@ -434,12 +434,14 @@ class Builder {
     pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
     add(Kernel::regress, pass, views, 0);
-    add(Kernel::adopt, pass, views, (how & ADOPT_UNSEEN) != 0 ? 0 : 1);
+    add(adopt, pass, views, adopt == Kernel::adopt ? 1 : 0);
   }
 
   /// Regressed planes get their costs when they have been voted on. Until then, pixels keep those
   /// of the planes before, which lie near enough for the checks of repair().
-  unsigned until_vote() const { return options_.vote_radius > 0 ? ADOPT_UNSEEN : 0; }
+  Kernel until_vote() const {
+    return options_.vote_radius > 0 ? Kernel::adopt_point : Kernel::adopt;
+  }
 
   void vote() {
     if (options_.vote_radius == 0) return;
@@ -520,7 +522,8 @@ const char* to_string(Kernel kernel) {
                                                                   "renew",
                                                                   "interpolate",
                                                                   "subpixel",
-                                                                  "ambiguity"};
+                                                                  "ambiguity",
+                                                                  "adopt_point"};
   return names[static_cast<std::size_t>(kernel)];
 }
 

@@ -36,8 +36,9 @@ enum class Kernel {
   interpolate,       ///< intensities of a view at half pixels
   subpixel,          ///< moves what was measured to where each patch matches best
   ambiguity,         ///< adds to the checks where another place matches better
+  adopt_point,       ///< takes regressed planes over whose costs follow later
 };
-inline constexpr int kernel_count = 23;
+inline constexpr int kernel_count = 24;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).

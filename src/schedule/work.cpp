@@ -108,7 +108,6 @@ struct Traffic {
 
 Traffic traffic_of(const Dispatch& dispatch) {
   constexpr unsigned seen = ray | intensity;
-  const bool patches = dispatch.samples > 0;
   switch (dispatch.kernel) {
     case Kernel::initialise:
       return {seen, half_pixels, plane};
@@ -145,8 +144,9 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::regress:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:
-      if (!patches) return {prior | plane | ray | checks, 0, plane | checks};
       return {prior | plane | seen, half_pixels, plane};
+    case Kernel::adopt_point:
+      return {prior | plane | ray | checks, 0, plane | checks};
     case Kernel::fill:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt_fill:

@@ -146,8 +146,7 @@ TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {
   const auto adopted = [&] {
     fixture_.view(0).hypotheses(pixel.y, pixel.x) = held;
     fixture_.view(0).priors(pixel.y, pixel.x) = prior;
-    fixture_.pass().candidates = ADOPT_UNSEEN;
-    kernel::cpu::adopt_pixel(fixture_.context(), pixel);
+    kernel::cpu::adopt_point_pixel(fixture_.context(), pixel);
     return fixture_.view(0).hypotheses(pixel.y, pixel.x);
   };
   EXPECT_EQ(adopted(), cv::Vec4f(0, 0, 0.6f, 0.1f));

@@ -70,7 +70,7 @@ TEST(Launches, RunOverAllViewsOfALevelWhereTheseDoNotReadEachOther) {
   // At full size, views are measured against those before that are regressed already; three rounds,
   // the first with a sub-pixel match.
   const auto of_regression =
-      AnyOf(Kernel::measure, Kernel::subpixel, Kernel::regress, Kernel::adopt);
+      AnyOf(Kernel::measure, Kernel::subpixel, Kernel::regress, Kernel::adopt_point);
   EXPECT_THAT(single_launches(make_schedule(rig, fast)),
               AllOf(SizeIs(3 * (3 * 3 + 1)), Each(of_regression)));
   // Planes that move on share the transfer buffers.
