@@ -2,8 +2,11 @@
 // The plane of a neighbourhood: inverse distance is exactly linear in the ray, so that it is a linear least-squares
 // problem, here a robust one, weighted by how precisely each pixel was measured.
 
-// Largest scale (px) of the robust weights.
-#define LARGEST_RESIDUAL 0.6f
+// Squared scale of the robust weights, in variances of the neighbour and of the pixel itself. Its own counts little: on
+// weak texture it would make the scale so wide that other surfaces count as the pixel's.
+#define NEIGHBOUR_SHARE 4.5f
+#define OWN_SHARE 0.3f
+#define LARGEST_SQUARED_SCALE 0.72f  // px^2
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
@@ -32,7 +35,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float inverse_scale = PARAMETERS.support.y;
-  float twice_own = 2.0f * own.x;
+  float of_own = OWN_SHARE * own.x;
   radius = max(radius, SMALLEST_FIT_RADIUS);
   int step = max(radius / PASS.steps, 1);
   radius = min(radius, step * PASS.steps);
@@ -70,7 +73,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float displacement = residual * measure.y;
       // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own. Everything that
       // weighs shares one division.
-      float scale2 = min(2.0f * measure.x + twice_own, 2.0f * LARGEST_RESIDUAL * LARGEST_RESIDUAL);
+      float scale2 = min(NEIGHBOUR_SHARE * measure.x + of_own, LARGEST_SQUARED_SCALE);
       float doubt = scale2 + displacement * displacement;
       float remoteness = 1.0f + fall_off * (squared_dy + dx * dx);
       float unlikeness = root_of_unlikeness(measure.w - own.w, inverse_scale);
