@@ -128,6 +128,19 @@ TEST_F(Regression, DoesNotBlendSurfaces) {
   }
 }
 
+TEST_F(Regression, OfAWeakPixelDoesNotBlendSurfacesThatLieNearEachOther) {
+  const auto step = [](int x) -> Eigen::Vector3d { return x < 48 ? wall : 1.3 * wall; };  // 0.45 px
+  measure(step, 0.05, 0.1);
+  const cv::Mat_<cv::Vec4f> strong = fixture_.view(0).checks.clone();
+  EXPECT_LT(over_pixels(40, 47,
+                        [&](ivec2 pixel) {
+                          strong.copyTo(fixture_.view(0).checks);
+                          fixture_.view(0).checks(pixel.y, pixel.x)[0] = 0.3f;
+                          return displacement(pixel, regressed(pixel, 18, 0.015), wall);
+                        }),
+            0.03);
+}
+
 TEST_F(Regression, FillsWhatWasNotMeasuredFromAround) {
   measure([](int) { return wall; }, 0.05, 0.1);
   const cv::Rect weak(44, 44, 9, 9);
