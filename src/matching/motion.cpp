@@ -161,7 +161,6 @@ class Alignment {
     double residual;
     Eigen::Matrix<double, 1, 6> by_motion;
     double intensity;  ///< of the previous frame: derivative by the gain
-    std::size_t view;
   };
 
   double median_distance() const {
@@ -196,7 +195,6 @@ class Alignment {
           static_cast<double>(seen[0]) - brightness_[i][0] * intensity - brightness_[i][1];
       row.by_motion << -by_point * cross_matrix(moved), by_point;
       row.intensity = intensity;
-      row.view = i;
     }
     return rows;
   }
@@ -204,36 +202,38 @@ class Alignment {
   Normals linearise(const std::vector<BlurredView>& views) const {
     std::vector<std::vector<Row>> of_views(views.size());
     for_each_view(views.size(), [&](std::size_t i) { of_views[i] = rows_of(i, views[i]); });
-    std::vector<Row> all;
-    for (const std::vector<Row>& of_view : of_views) {
-      all.insert(all.end(), of_view.begin(), of_view.end());
-    }
     const Eigen::Index unknowns = 6 + 2 * static_cast<Eigen::Index>(views.size());
     Normals normals;
-    normals.points = all.size();
     normals.information = Eigen::MatrixXd::Zero(unknowns, unknowns);
     normals.gradient = Eigen::VectorXd::Zero(unknowns);
-    if (all.empty()) return normals;
     std::vector<double> sizes;
-    for (const Row& row : all) sizes.push_back(std::abs(row.residual));
+    for (const std::vector<Row>& rows : of_views) {
+      for (const Row& row : rows) sizes.push_back(std::abs(row.residual));
+    }
+    normals.points = sizes.size();
+    if (sizes.empty()) return normals;
     const double scale = 1.4826 * upper_median(sizes) + 1e-4;
     normals.variance = scale * scale;
-    for (const Row& row : all) {
-      // Geman and McClure's weight: what moves by itself or was occluded counts for little.
-      const double doubt = 1 + row.residual * row.residual / (4 * scale * scale);
-      const double weight = 1 / (doubt * doubt);
-      Eigen::Matrix<double, 8, 1> by;
-      by << row.by_motion.transpose(), -row.intensity, -1;
-      const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(row.view);
-      normals.information.topLeftCorner<6, 6>() += weight * by.head<6>() * by.head<6>().transpose();
-      normals.information.block<6, 2>(0, place) += weight * by.head<6>() * by.tail<2>().transpose();
-      normals.information.block<2, 2>(place, place) +=
-          weight * by.tail<2>() * by.tail<2>().transpose();
-      normals.gradient.head<6>() += weight * row.residual * by.head<6>();
-      normals.gradient.segment<2>(place) += weight * row.residual * by.tail<2>();
-      normals.cost += row.residual * row.residual / doubt;
+    for (std::size_t i = 0; i < of_views.size(); ++i) {
+      const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);
+      for (const Row& row : of_views[i]) {
+        // Geman and McClure's weight: what moves by itself or was occluded counts for little.
+        const double doubt = 1 + row.residual * row.residual / (4 * scale * scale);
+        const double weight = 1 / (doubt * doubt);
+        Eigen::Matrix<double, 8, 1> by;
+        by << row.by_motion.transpose(), -row.intensity, -1;
+        normals.information.topLeftCorner<6, 6>() +=
+            weight * by.head<6>() * by.head<6>().transpose();
+        normals.information.block<6, 2>(0, place) +=
+            weight * by.head<6>() * by.tail<2>().transpose();
+        normals.information.block<2, 2>(place, place) +=
+            weight * by.tail<2>() * by.tail<2>().transpose();
+        normals.gradient.head<6>() += weight * row.residual * by.head<6>();
+        normals.gradient.segment<2>(place) += weight * row.residual * by.tail<2>();
+        normals.cost += row.residual * row.residual / doubt;
+      }
     }
-    normals.cost /= static_cast<double>(all.size());
+    normals.cost /= static_cast<double>(normals.points);
     normals.information.triangularView<Eigen::StrictlyLower>() =
         normals.information.transpose().triangularView<Eigen::StrictlyLower>();
     return normals;

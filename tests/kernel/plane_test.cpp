@@ -314,7 +314,6 @@ TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   Options options = wide_range();
   options.ambiguity_margin = 0.2;
   AgreeingViews views(options);
-  views.fixture.pass().places = 6;
   const auto added_at_cost = [&](double cost, int places) {
     const vec3 m = views.plane(0);
     views.fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, cost));
