@@ -16,6 +16,7 @@
 #define SCALE_OF_16_BITS (1.0f / 65535.0f)
 // Intensities end here: 1, with room for rounding.
 #define ABOVE_INTENSITY (1.0f + 1e-6f)
+#define SIGN_BIT 0x80000000u
 
 // Maps of a view.
 #define MAP_DISTANCE 0
@@ -24,8 +25,10 @@
 #define MAP_CONFIDENCE 3
 #define MAP_REASONS 4
 
+// By its bits, which order floats that are not negative: shader compilers may take every float for a number.
 FN float intensity_or_masked(float value) {
-  return value >= 0.0f && value < ABOVE_INTENSITY ? value : MASKED_INTENSITY;
+  uint bits = float_as_uint(value);
+  return bits < float_as_uint(ABOVE_INTENSITY) || bits == SIGN_BIT ? value : MASKED_INTENSITY;
 }
 
 // Rec. 601, as OpenCV makes grey of colours.

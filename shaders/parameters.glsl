@@ -16,7 +16,11 @@
 // Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl).
 #define HALF_PIXEL_APRON (2 * APRON)
 
-// In a vote, the planes that compete with the pixel's own, and the radius of the part of the patch that compares them.
+// In a vote, the planes that stand for election besides the pixel's own (of pixels in eight directions, at half the
+// radius and at it), the step between the pixels that vote, the planes that then compete with the pixel's own, and the
+// radius of the part of the patch that compares them.
+#define VOTE_CANDIDATES 16
+#define VOTE_STEP 3
 #define VOTE_RIVALS 2
 #define VOTE_MIDDLE_RADIUS 1
 
@@ -72,9 +76,12 @@
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
 
-// Of the plane regression: the round, from 0 on, that first asks a whole neighbourhood, each before it half the next
-// one; the smallest radius (pixels) that a plane is fitted to; the variance (px^2) of what was not measured.
+// Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
+// before it half the next one; those for normals alone, over an eighth, twice a half, and the whole radius; the smallest
+// radius (pixels) that a plane is fitted to; the variance (px^2) of what was not measured.
+#define REGRESSION_ROUNDS 5
 #define WHOLE_RADIUS_ROUND 3
+#define NORMAL_ROUNDS 4
 #define SMALLEST_FIT_RADIUS 2
 #define UNMEASURED_VARIANCE 1e4f
 

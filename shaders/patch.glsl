@@ -30,7 +30,6 @@ FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
 #ifdef HAS_DEVICE_FILTER
   if (FILTER == FILTER_DEVICE) return filtered_half_pixel(CONTEXT view, texel);
 #endif
-  // The limit comes first: then it also replaces what is no number.
   float x = min(float(2 * size.x), max(-2.0f, texel.x));
   float y = min(float(2 * size.y), max(-2.0f, texel.y));
   float left = floor(x);

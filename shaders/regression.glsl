@@ -2,10 +2,6 @@
 // Local plane regression: every pixel takes the plane of the neighbourhood that determines it. It fills weak texture
 // from confident surroundings and makes distances sub-pixel accurate.
 
-// Rounds for distances, the last two over the whole radius, the others over an eighth, a quarter and a half of it.
-#define REGRESSION_ROUNDS 5
-// Rounds for normals alone: over an eighth, twice a half, and the whole radius.
-#define NORMAL_ROUNDS 4
 // Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
 #define LARGEST_SLOPE_CHANGE 6.0f
 

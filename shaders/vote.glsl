@@ -3,10 +3,6 @@
 // over the weaker texture beside it. Most of the pixels that look alike around there still lie on the right one, and
 // the middle of the patch, too small to hold the edge, tells the candidates apart where it has texture of its own.
 
-// Planes that stand for election besides the pixel's own: of pixels in eight directions, at half the radius and at it.
-#define VOTE_CANDIDATES 16
-// Step between the pixels that vote.
-#define VOTE_STEP 3
 // Displacement (source pixels) from which on a plane does not support another.
 #define VOTE_DISPLACEMENT 0.4f
 // Planes nearer than this to the pixel's own do not stand, so that curved surfaces stay curved.

@@ -26,10 +26,10 @@
 
 namespace widestereo {
 
-/// What an application hands in to have matching done on its own device. The device must be of
-/// Vulkan 1.1 or newer and the queue family must compute; no feature or extension needs to be
-/// enabled. Nothing handed in is ever destroyed. Vulkan requires that nobody else uses `queue`
-/// during a call that submits.
+/// What an application hands in to have matching done on its own device. The instance (its
+/// apiVersion) and the device must be of Vulkan 1.1 or newer and the queue family must compute; no
+/// feature or extension needs to be enabled. Nothing handed in is ever destroyed. Vulkan requires
+/// that nobody else uses `queue` during a call that submits.
 struct VulkanHandles {
   PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
   VkInstance instance = VK_NULL_HANDLE;
@@ -115,15 +115,25 @@ class VulkanMatcher {
   /// family: reads the images and writes the maps. Neither submits, waits nor allocates. It waits
   /// for earlier compute and transfer commands of the queue; images that other stages write, and
   /// the layouts of textures, need a barrier before it (to VK_ACCESS_SHADER_READ_BIT of the compute
-  /// stage). Whoever reads the maps puts one behind it (from VK_ACCESS_SHADER_WRITE_BIT of the
-  /// compute stage), and so does whoever writes the next images. May be submitted again and again.
-  /// Where nothing overlaps, all costs are 2.
+  /// stage), and where other stages still read the maps, their next match needs one from these to
+  /// the compute stage. Whoever reads the maps puts one behind it (from VK_ACCESS_SHADER_WRITE_BIT
+  /// of the compute stage), and so does whoever writes the next images. Leaves its own compute
+  /// pipeline, descriptor sets and push constants bound. May be submitted again and again. Where
+  /// nothing overlaps, all costs are 2.
   void record(VkCommandBuffer commands, const VulkanBindings& bindings);
+
+  /// Spreads the match over several command buffers of about the same work, to be submitted in this
+  /// order: watchdogs end what takes too long, some systems (amdgpu, Metal) counting submissions
+  /// rather than dispatches, and between them other work gets its turn. A Matcher's own submissions
+  /// are made for a tenth of a second on a slow GPU.
+  void record(std::span<const VkCommandBuffer> commands, const VulkanBindings& bindings);
 
   /// The same for the next frame of a sequence, from the planes that whatever ran before leaves on
   /// the device, as Matcher::match_next() does: a fraction of the work. `start` is fixed when it is
   /// recorded; its hypotheses must be empty. Throws Error where no match was recorded before.
   void record_next(VkCommandBuffer commands, const VulkanBindings& bindings,
+                   const WarmStart& start = {});
+  void record_next(std::span<const VkCommandBuffer> commands, const VulkanBindings& bindings,
                    const WarmStart& start = {});
 
   std::size_t device_bytes() const;

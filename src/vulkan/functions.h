@@ -15,6 +15,7 @@ namespace widestereo {
   X(vkDestroyInstance)                            \
   X(vkEnumeratePhysicalDevices)                   \
   X(vkEnumerateDeviceExtensionProperties)         \
+  X(vkGetPhysicalDeviceProperties)                \
   X(vkGetPhysicalDeviceProperties2)               \
   X(vkGetPhysicalDeviceQueueFamilyProperties)     \
   X(vkGetPhysicalDeviceMemoryProperties)          \

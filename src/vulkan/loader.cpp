@@ -9,7 +9,9 @@ namespace widestereo {
 namespace {
 
 #ifdef __APPLE__
-constexpr const char* library_names[] = {"libvulkan.1.dylib", "libMoltenVK.dylib"};
+// Homebrew's folder on Apple silicon is none of those that dlopen() looks into.
+constexpr const char* library_names[] = {"libvulkan.1.dylib", "/opt/homebrew/lib/libvulkan.1.dylib",
+                                         "libMoltenVK.dylib"};
 #else
 constexpr const char* library_names[] = {"libvulkan.so.1", "libvulkan.so"};
 #endif

@@ -25,7 +25,7 @@ Handle<VkDeviceMemory> allocate(const VulkanContext& context,
   return context.own(memory, context.vk().vkFreeMemory);
 }
 
-/// Device memory is a wish: any type will do.
+/// Device memory is a wish: where none is allowed, any type will do.
 std::uint32_t device_memory_type(const VulkanContext& context, std::uint32_t allowed) {
   const std::uint32_t type = context.memory_type(allowed, VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT);
   return type < VK_MAX_MEMORY_TYPES ? type : context.memory_type(allowed, 0);
@@ -66,21 +66,26 @@ Buffer make_buffer(const VulkanContext& context, VkDeviceSize bytes, VkBufferUsa
 void require_image_limits(const VulkanContext& context, VkFormat format, cv::Size size, int layers,
                           VkImageUsageFlags usage, const std::string& purpose) {
   const VkImageFormatProperties limits = context.image_limits(format, usage);
-  const auto refuse = [&](const std::string& limit, std::uint32_t offered) {
+  const auto refuse = [&](const std::string& limit, const std::string& offered) {
     throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " (" +
                 std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels, " +
-                std::to_string(layers) + " layers): its " + limit + " is " +
-                std::to_string(offered) + "; use smaller images or another device.");
+                std::to_string(layers) + " layers): its " + limit + " is " + offered +
+                "; use smaller images or another device.");
   };
   if (size.width > static_cast<long long>(limits.maxExtent.width)) {
-    refuse("largest image width", limits.maxExtent.width);
+    refuse("largest image width", std::to_string(limits.maxExtent.width));
   }
   if (size.height > static_cast<long long>(limits.maxExtent.height)) {
-    refuse("largest image height", limits.maxExtent.height);
+    refuse("largest image height", std::to_string(limits.maxExtent.height));
   }
   if (layers > static_cast<long long>(limits.maxArrayLayers)) {
-    refuse("maxImageArrayLayers", limits.maxArrayLayers);
+    refuse("maxImageArrayLayers", std::to_string(limits.maxArrayLayers));
   }
+  const VkDeviceSize bytes_of_pixel = format == VK_FORMAT_R32_SFLOAT ? 4 : 16;
+  const VkDeviceSize bytes = bytes_of_pixel * static_cast<VkDeviceSize>(size.width) *
+                             static_cast<VkDeviceSize>(size.height) *
+                             static_cast<VkDeviceSize>(layers);
+  if (bytes > limits.maxResourceSize) refuse("maxResourceSize", mebibytes(limits.maxResourceSize));
 }
 
 }  // namespace

@@ -70,10 +70,9 @@ bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device) {
 }
 
 VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysicalDevice device) {
-  VkPhysicalDeviceProperties2 properties{};
-  properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
-  vk.vkGetPhysicalDeviceProperties2(device, &properties);
-  return properties.properties;
+  VkPhysicalDeviceProperties properties{};
+  vk.vkGetPhysicalDeviceProperties(device, &properties);
+  return properties;
 }
 
 bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name) {
@@ -93,14 +92,17 @@ bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, 
 
 std::optional<std::uint32_t> compute_queue_family(const InstanceFunctions& vk,
                                                   VkPhysicalDevice device) {
-  std::optional<std::uint32_t> found;
+  const auto merit = [](const VkQueueFamilyProperties& family) {
+    return (family.timestampValidBits > 0 ? 2 : 0) +
+           ((family.queueFlags & VK_QUEUE_GRAPHICS_BIT) == 0 ? 1 : 0);
+  };
+  std::optional<std::uint32_t> best;
   const auto families = queue_families(vk, device);
   for (std::uint32_t i = 0; i < families.size(); ++i) {
     if ((families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) == 0) continue;
-    if (families[i].timestampValidBits > 0) return i;
-    if (!found) found = i;
+    if (!best || merit(families[i]) > merit(families[*best])) best = i;
   }
-  return found;
+  return best;
 }
 
 std::string why_no_compute(const InstanceFunctions& vk, VkPhysicalDevice device,

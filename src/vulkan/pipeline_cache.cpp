@@ -92,13 +92,17 @@ PipelineCache::PipelineCache(const VulkanContext& context, std::filesystem::path
 
 std::vector<char> PipelineCache::data() const {
   const DeviceFunctions& vk = context_.vk();
-  std::size_t bytes = 0;
-  context_.check(vk.vkGetPipelineCacheData(context_.device(), get(), &bytes, nullptr),
-                 "read its pipeline cache");
-  std::vector<char> data(bytes);
-  context_.check(vk.vkGetPipelineCacheData(context_.device(), get(), &bytes, data.data()),
-                 "read its pipeline cache");
-  data.resize(bytes);
+  std::vector<char> data;
+  VkResult result = VK_INCOMPLETE;  // also where the driver added something in between
+  while (result == VK_INCOMPLETE) {
+    std::size_t bytes = 0;
+    context_.check(vk.vkGetPipelineCacheData(context_.device(), get(), &bytes, nullptr),
+                   "read its pipeline cache");
+    data.resize(bytes);
+    result = vk.vkGetPipelineCacheData(context_.device(), get(), &bytes, data.data());
+    data.resize(bytes);
+  }
+  context_.check(result, "read its pipeline cache");
   return data;
 }
 

@@ -14,9 +14,10 @@ std::string reason(VkResult result) {
       return "out of device memory; use smaller images or another device.";
     case VK_ERROR_DEVICE_LOST:
       return "the device was lost (driver crash or watchdog); open it again, with smaller "
-             "dispatches (max_samples_per_dispatch) if this repeats.";
+             "dispatches (max_samples_per_dispatch; of a VulkanMatcher more command buffers) if "
+             "this repeats.";
     case VK_ERROR_INITIALIZATION_FAILED:
-      return "the driver failed to initialise; check its installation.";
+      return "the driver refused; update it or use another device.";
     case VK_ERROR_INCOMPATIBLE_DRIVER:
       return "no Vulkan driver was found; install one (mesa-vulkan-drivers has a software driver).";
     case VK_ERROR_LAYER_NOT_PRESENT:

@@ -392,13 +392,16 @@ void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) cons
                    static_cast<std::uint32_t>(band.dispatch->views));
 }
 
-void VulkanBackend::record(VkCommandBuffer commands, const Schedule& schedule) const {
-  record_parameters(commands, schedule);
-  record_dispatches(commands, schedule);
-}
-
-void VulkanBackend::record_dispatches(VkCommandBuffer commands, const Schedule& schedule) const {
-  for (const Band& band : split_into_bands(schedule, max_samples_)) record_band(commands, band);
+void VulkanBackend::record_dispatches(std::span<const VkCommandBuffer> commands,
+                                      const Schedule& schedule) const {
+  long long total = 0;
+  for (const Band& band : split_into_bands(schedule, max_samples_)) total += band.work;
+  const long long share = total / static_cast<long long>(commands.size());
+  const std::vector<Band> bands = split_into_bands(schedule, std::clamp(share, 1LL, max_samples_));
+  const auto shares = share_out(bands, commands.size());
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    for (const Band& band : shares[i]) record_band(commands[i], band);
+  }
 }
 
 /// Feeds the two submissions in turn and accounts for what they have finished.

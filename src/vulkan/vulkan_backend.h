@@ -27,8 +27,8 @@ struct VulkanTuning {
 };
 
 /// Images and kernels for matches of fixed sizes on a Vulkan device. Not thread-safe; the context
-/// must outlive it. Everything but record() submits to the context's queue and waits for its own
-/// fence.
+/// must outlive it. Everything but record_…() submits to the context's queue and waits for its
+/// own fence.
 class VulkanBackend final : public Backend {
  public:
   /// Throws Error naming the device and the memory, limit or feature that it lacks.
@@ -37,14 +37,14 @@ class VulkanBackend final : public Backend {
                 const VulkanTuning& tuning = {});
   ~VulkanBackend() override;
 
-  /// Records a whole schedule into a command buffer of the caller's, which the caller submits to a
-  /// queue of the context's family; submits nothing and waits for nothing. The commands wait for
-  /// earlier compute and transfer commands of the queue; a caller that reads the results puts a
-  /// barrier after them (from compute shader writes; all images are in VK_IMAGE_LAYOUT_GENERAL).
-  void record(VkCommandBuffer commands, const Schedule& schedule) const;
-  /// The two parts of record(), for further kernels between them: these need the parameters.
+  /// Records a whole schedule into command buffers of the caller's, which the caller submits to a
+  /// queue of the context's family; submits nothing and waits for nothing. The parameters come
+  /// first, in the first of them; further kernels may follow, and then the dispatches in shares of
+  /// about the same work. The commands wait for earlier compute and transfer commands of the queue;
+  /// a caller that reads the results puts a barrier after them (from compute shader writes; all
+  /// images are in VK_IMAGE_LAYOUT_GENERAL).
   void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
-  void record_dispatches(VkCommandBuffer commands, const Schedule& schedule) const;
+  void record_dispatches(std::span<const VkCommandBuffer> commands, const Schedule& schedule) const;
   /// Lets a kernel see what earlier ones wrote.
   void record_barrier(VkCommandBuffer commands) const;
   const Pipelines& pipelines() const { return pipelines_; }

@@ -14,6 +14,7 @@ namespace widestereo {
 namespace {
 
 using Way = Conversion::Way;
+using Commands = std::span<const VkCommandBuffer>;
 
 constexpr std::size_t word = sizeof(float);
 
@@ -94,12 +95,12 @@ class VulkanMatcher::Implementation {
     return bind(std::move(conversions), maps);
   }
 
-  void record(VkCommandBuffer commands, const VulkanBindings::Implementation& bindings) {
+  void record(Commands commands, const VulkanBindings::Implementation& bindings) {
     record(commands, bindings, setup_.schedule);
     holds_planes_ = true;
   }
 
-  void record_next(VkCommandBuffer commands, const VulkanBindings::Implementation& bindings,
+  void record_next(Commands commands, const VulkanBindings::Implementation& bindings,
                    const WarmStart& start) {
     if (!holds_planes_) {
       throw Error(
@@ -147,15 +148,16 @@ class VulkanMatcher::Implementation {
     return VulkanBindings(std::move(bindings));
   }
 
-  void record(VkCommandBuffer commands, const VulkanBindings::Implementation& bindings,
+  void record(Commands commands, const VulkanBindings::Implementation& bindings,
               const Schedule& schedule) const {
     if (bindings.matcher != this) {
       throw Error("The bindings were made by another matcher; use those of this one.");
     }
-    backend_.record_parameters(commands, schedule);
-    conversions_.record_images(commands, bindings.conversions);
+    if (commands.empty()) throw Error("There is no command buffer to record into; give one.");
+    backend_.record_parameters(commands.front(), schedule);
+    conversions_.record_images(commands.front(), bindings.conversions);
     backend_.record_dispatches(commands, schedule);
-    conversions_.record_maps(commands, bindings.conversions);
+    conversions_.record_maps(commands.back(), bindings.conversions);
   }
 
   Rig rig_;
@@ -189,9 +191,16 @@ VulkanBindings VulkanMatcher::bind(std::span<const VulkanTexture> images,
   return implementation_->bind(images, maps);
 }
 void VulkanMatcher::record(VkCommandBuffer commands, const VulkanBindings& bindings) {
+  record({&commands, 1}, bindings);
+}
+void VulkanMatcher::record(Commands commands, const VulkanBindings& bindings) {
   implementation_->record(commands, *bindings.implementation_);
 }
 void VulkanMatcher::record_next(VkCommandBuffer commands, const VulkanBindings& bindings,
+                                const WarmStart& start) {
+  record_next({&commands, 1}, bindings, start);
+}
+void VulkanMatcher::record_next(Commands commands, const VulkanBindings& bindings,
                                 const WarmStart& start) {
   implementation_->record_next(commands, *bindings.implementation_, start);
 }

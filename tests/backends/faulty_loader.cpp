@@ -14,7 +14,8 @@ PFN_vkGetDeviceProcAddr real_get_device = nullptr;
 PFN_vkAllocateMemory real_allocate = nullptr;
 PFN_vkQueueSubmit real_submit = nullptr;
 PFN_vkWaitForFences real_wait = nullptr;
-PFN_vkGetPhysicalDeviceProperties2 real_properties = nullptr;
+PFN_vkGetPipelineCacheData real_cache_data = nullptr;
+PFN_vkGetPhysicalDeviceProperties real_properties = nullptr;
 PFN_vkGetPhysicalDeviceFormatProperties real_formats = nullptr;
 PFN_vkGetPhysicalDeviceQueueFamilyProperties real_queue_families = nullptr;
 PFN_vkGetPhysicalDeviceImageFormatProperties real_image_limits = nullptr;
@@ -57,25 +58,40 @@ VKAPI_ATTR void VKAPI_CALL formats(VkPhysicalDevice device, VkFormat format,
   }
 }
 
-VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceProperties2* out) {
-  real_properties(device, out);
-  if (faults().is_gpu) out->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-  if (faults().old_device) out->properties.apiVersion = VK_API_VERSION_1_0;
-  if (faults().largest_push_constants > 0) {
-    out->properties.limits.maxPushConstantsSize = faults().largest_push_constants;
+VKAPI_ATTR VkResult VKAPI_CALL cache_data(VkDevice device, VkPipelineCache cache,
+                                          std::size_t* bytes, void* data) {
+  if (data == nullptr || faults().growing_caches == 0) {
+    return real_cache_data(device, cache, bytes, data);
   }
+  --faults().growing_caches;
+  *bytes = 0;
+  return VK_INCOMPLETE;
+}
+
+VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceProperties* out) {
+  real_properties(device, out);
+  if (faults().is_gpu) out->deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+  if (faults().old_device) out->apiVersion = VK_API_VERSION_1_0;
+  if (faults().largest_push_constants > 0) {
+    out->limits.maxPushConstantsSize = faults().largest_push_constants;
+  }
+}
+
+VKAPI_ATTR void VKAPI_CALL properties_since_1_1(VkPhysicalDevice, VkPhysicalDeviceProperties2*) {
+  ADD_FAILURE() << "a device of Vulkan 1.0 has no vkGetPhysicalDeviceProperties2";
 }
 
 VKAPI_ATTR void VKAPI_CALL queue_families(VkPhysicalDevice device, std::uint32_t* count,
                                           VkQueueFamilyProperties* families) {
   const std::uint32_t room = *count;
   real_queue_families(device, count, families);
-  if (faults().transfer_family) {
+  if (faults().more_family != 0) {
     faults().families = ++*count;
     if (families == nullptr) return;
     if (*count <= room) {
       families[*count - 1] = {};
-      families[*count - 1].queueFlags = VK_QUEUE_TRANSFER_BIT;
+      families[*count - 1].queueFlags = faults().more_family;
+      families[*count - 1].timestampValidBits = faults().clock_of_more_family;
     }
     return;
   }
@@ -89,7 +105,10 @@ VKAPI_ATTR VkResult VKAPI_CALL image_limits(VkPhysicalDevice device, VkFormat fo
                                             VkImageUsageFlags usage, VkImageCreateFlags flags,
                                             VkImageFormatProperties* limits) {
   const VkResult result = real_image_limits(device, format, type, tiling, usage, flags, limits);
-  limits->maxExtent.width = std::min(limits->maxExtent.width, faults().largest_image);
+  if (faults().largest_image > 0) {
+    limits->maxExtent.width = std::min(limits->maxExtent.width, faults().largest_image);
+  }
+  if (faults().largest_resource > 0) limits->maxResourceSize = faults().largest_resource;
   return result;
 }
 
@@ -106,6 +125,7 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device(VkDevice device, const char*
   if (wanted == "vkAllocateMemory") return wrap(real, real_allocate, &allocate);
   if (wanted == "vkQueueSubmit") return wrap(real, real_submit, &submit);
   if (wanted == "vkWaitForFences") return wrap(real, real_wait, &wait);
+  if (wanted == "vkGetPipelineCacheData") return wrap(real, real_cache_data, &cache_data);
   return real;
 }
 
@@ -118,14 +138,17 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance(VkInstance instance, const
     return reinterpret_cast<PFN_vkVoidFunction>(&no_layers);
   }
   if (wanted == "vkGetPhysicalDeviceFormatProperties") return wrap(real, real_formats, &formats);
-  if (wanted == "vkGetPhysicalDeviceProperties2") {
+  if (wanted == "vkGetPhysicalDeviceProperties") {
     return wrap(real, real_properties, &properties);
   }
+  if (wanted == "vkGetPhysicalDeviceProperties2" && faults().old_device) {
+    return reinterpret_cast<PFN_vkVoidFunction>(&properties_since_1_1);
+  }
   if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" &&
-      (faults().no_compute_queues || faults().transfer_family)) {
+      (faults().no_compute_queues || faults().more_family != 0)) {
     return wrap(real, real_queue_families, &queue_families);
   }
-  if (wanted == "vkGetPhysicalDeviceImageFormatProperties" && faults().largest_image > 0) {
+  if (wanted == "vkGetPhysicalDeviceImageFormatProperties") {
     return wrap(real, real_image_limits, &image_limits);
   }
   return real;

@@ -2,6 +2,8 @@
 // A Vulkan application that matches in its own command buffers must get what a Matcher gets.
 #include <gmock/gmock.h>
 
+#include <deque>
+
 #include "pixel_fixture.h"
 #include "vulkan/memory.h"
 #include "vulkan_fixture.h"
@@ -421,6 +423,7 @@ TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
   images[0](cv::Rect(20, 20, 20, 20)).setTo(std::numeric_limits<float>::quiet_NaN());
   images[0](cv::Rect(20, 20, 20, 5)).setTo(1.1);
   images[0](cv::Rect(20, 25, 20, 5)).setTo(-0.1);
+  images[0](cv::Rect(50, 30, 1, 1)).setTo(-0.0);
   Options options = small_options("fast");
   options.fill_radius = side;
   VulkanMatcher matcher(application.context.handles(), pair.rig, options);
@@ -442,6 +445,7 @@ TEST(VulkanApplications, MaskWhatIsNoIntensityAndWriteWhatIsAskedFor) {
   EXPECT_GT(cv::countNonZero(found), side * side / 2);
   const cv::Mat why = reasons.mat({side, side}, CV_32SC1, 0, 4 * side);
   EXPECT_EQ(cv::countNonZero(why(masked) != static_cast<double>(reason_no_ray)), 0);
+  EXPECT_NE(why.at<int>(30, 50), reason_no_ray) << "minus zero is an intensity";
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
@@ -476,6 +480,33 @@ TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
     commands.run();
     memory.expect_equal(expected.match_next(images, start));
   }
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+TEST(VulkanApplications, MayGiveOneMatchToSeveralCommandBuffers) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  Device device = Device::open("vulkan:0");
+  const RenderedPair pair = render_demo(side);
+  const std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
+  const Options options = small_options("fast");
+  Matcher expected(device, pair.rig, options);
+  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
+  ApplicationBuffers memory(application.context, PixelType::grey8);
+  const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
+  memory.set(images);
+  for (const bool warm : {false, true}) {
+    std::deque<Commands> parts;
+    std::vector<VkCommandBuffer> handles;
+    for (int i = 0; i < 5; ++i) handles.push_back(parts.emplace_back(application.context).get());
+    warm ? matcher.record_next(handles, bindings) : matcher.record(handles, bindings);
+    for (Commands& part : parts) part.end();
+    memory.clear();
+    for (Commands& part : parts) part.run();
+    memory.expect_equal(warm ? expected.match_next(images, {}) : expected.match(images));
+  }
+  EXPECT_THAT(error_of([&] { matcher.record(std::span<const VkCommandBuffer>(), bindings); }),
+              HasSubstr("no command buffer"));
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 

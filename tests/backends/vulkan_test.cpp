@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "schedule/bands.h"
+#include "vulkan/physical_device.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"
 #include "widestereo/matcher.h"
@@ -190,8 +191,10 @@ TEST(VulkanMatch, RecordsIntoAnApplicationsCommandBuffer) {
             VK_SUCCESS);
   const auto pool = application.context.own(pool_handle, vk.vkDestroyCommandPool);
   Submission submission(application.context, pool.get(), 2);
-  backend.record(submission.begin(), match.schedule());
-  EXPECT_EQ(cv::norm(backend.hypotheses(0)), 0) << "record() must not run anything";
+  const VkCommandBuffer commands = submission.begin();
+  backend.record_parameters(commands, match.schedule());
+  backend.record_dispatches({&commands, 1}, match.schedule());
+  EXPECT_EQ(cv::norm(backend.hypotheses(0)), 0) << "recording must not run anything";
   submission.submit();
   submission.wait();
   EXPECT_TRUE(same_bits(expected, download(backend, match.rig())));
@@ -221,13 +224,31 @@ TEST(VulkanContexts, RefuseHandlesThatDoNotDo) {
   EXPECT_THAT(error(handles), HasSubstr("no queue family 1000"));
 
   const FaultyLoader::Scope scope;
-  FaultyLoader::faults().transfer_family = true;
+  FaultyLoader::faults().more_family = VK_QUEUE_TRANSFER_BIT;
   handles.get_instance_proc_addr = FaultyLoader::get_instance_proc_addr();
   handles.queue_family = 0;
   EXPECT_EQ(error(handles), "");
   // Lavapipe has one family, after which the faulty loader puts another one.
   handles.queue_family = FaultyLoader::faults().families - 1;
   EXPECT_THAT(error(handles), HasSubstr("cannot compute"));
+}
+
+TEST(VulkanQueues, AreThoseThatTellTimeThenThoseThatDoNotDraw) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const Application application;
+  const FaultyLoader::Scope scope;
+  const auto family_with = [&](VkQueueFlags more_family, std::uint32_t clock) {
+    FaultyLoader::faults() = {.more_family = more_family, .clock_of_more_family = clock};
+    const auto functions = InstanceFunctions::load(FaultyLoader::get_instance_proc_addr(),
+                                                   application.instance.handle());
+    return compute_queue_family(functions, application.instance.physical_devices().at(0));
+  };
+  // Lavapipe has one family, which draws and tells time.
+  const auto chosen = family_with(VK_QUEUE_COMPUTE_BIT, 64);
+  EXPECT_EQ(chosen, FaultyLoader::faults().families - 1);
+  EXPECT_EQ(family_with(VK_QUEUE_COMPUTE_BIT, 0), 0u);
+  EXPECT_EQ(family_with(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT, 64), 0u);
+  EXPECT_EQ(family_with(VK_QUEUE_TRANSFER_BIT, 64), 0u);
 }
 
 TEST(VulkanMatch, LeavesNoObjectBehind) {
@@ -402,6 +423,8 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   EXPECT_THAT(message_of_match(), HasSubstr("offers Vulkan 1.0.0"));
   FaultyLoader::faults() = {.largest_image = 40};
   EXPECT_THAT(message_of_match(), HasSubstr("largest image width is 40"));
+  FaultyLoader::faults() = {.largest_resource = 1000};
+  EXPECT_THAT(message_of_match(), HasSubstr("its maxResourceSize is 1 MiB"));
   FaultyLoader::faults() = {.largest_push_constants = 16};
   EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 64"));
 }
@@ -473,6 +496,17 @@ TEST_F(VulkanCache, DamagedFilesAreIgnoredAndReplaced) {
   }
 }
 
+TEST_F(VulkanCache, IsReadAgainWhereItGrowsMeanwhile) {
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults().growing_caches = 2;
+  const PFN_vkGetInstanceProcAddr get = FaultyLoader::get_instance_proc_addr();
+  VulkanInstance instance(get, false);
+  VulkanContext context(get, instance.handle(), instance.physical_devices().at(0));
+  PipelineCache(context, path_).save();
+  EXPECT_EQ(FaultyLoader::faults().growing_caches, 0);
+  EXPECT_TRUE(is_used());
+}
+
 TEST_F(VulkanCache, OtherFilesAreNeitherReadNorReplaced) {
   for (const std::string& content_before : {std::string("no cache"), std::string(500, '\0')}) {
     overwrite(content_before);
@@ -533,6 +567,37 @@ TEST(Bands, AreGroupedWithinLimits) {
   }
   EXPECT_EQ(next, bands.data() + bands.size());
   EXPECT_TRUE(group_for_submission({}, 1, 1).empty());
+}
+
+TEST(Bands, AreSharedOutEvenly) {
+  const Schedule schedule = small_match().schedule();
+  const std::vector<Band> bands = split_into_bands(schedule, 1000);
+  long long total = 0;
+  long long largest = 0;
+  for (const Band& band : bands) {
+    total += band.work;
+    largest = std::max(largest, band.work);
+  }
+  for (const std::size_t count : {1u, 3u, 10u}) {
+    const auto shares = share_out(bands, count);
+    ASSERT_EQ(shares.size(), count);
+    const Band* next = bands.data();
+    for (const auto share : shares) {
+      EXPECT_EQ(share.data(), next);
+      next = share.data() + share.size();
+      long long work = 0;
+      for (const Band& band : share) work += band.work;
+      EXPECT_NEAR(static_cast<double>(work),
+                  static_cast<double>(total) / static_cast<double>(count),
+                  static_cast<double>(largest));
+    }
+    EXPECT_EQ(next, bands.data() + bands.size());
+  }
+  const auto more_than_bands = share_out({bands.data(), 2}, 5);
+  ASSERT_EQ(more_than_bands.size(), 5u);
+  std::size_t shared = 0;
+  for (const auto share : more_than_bands) shared += share.size();
+  EXPECT_EQ(shared, 2u);
 }
 
 }  // namespace

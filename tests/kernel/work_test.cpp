@@ -5,10 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
+#include <map>
 #include <set>
 #include <utility>
 
 #include "counting_kernels.h"
+#include "schedule/bands.h"
 
 namespace widestereo::test {
 namespace {
@@ -109,6 +112,49 @@ TEST(Work, OfPlaneFitsOfATileReadsSideBySide) {
     }
   }
   EXPECT_GT(places.size(), 2u) << "other tiles' grids lie elsewhere";
+}
+
+/// What splitting counts for a dispatch of each kernel, in operations a pixel.
+std::map<Kernel, std::vector<double>> operations_of_bands(const Schedule& schedule) {
+  std::map<Kernel, std::vector<double>> operations;
+  const double of_sample = patch_operations(schedule.constants).of_sample;
+  for (const Band& band : split_into_bands(schedule, std::numeric_limits<long long>::max())) {
+    operations[band.dispatch->kernel].push_back(of_sample * static_cast<double>(band.work) /
+                                                static_cast<double>(band.dispatch->pixels));
+  }
+  return operations;
+}
+
+TEST(Work, OfABandIsThatOfPixelsThatAskTheirWholeNeighbourhood) {
+  Options options = Options::preset_named("fast");
+  options.regression_steps = 6;
+  options.regression_radius = 11;  // four times as much for normals lies in the image
+  KernelFixture fixture(fisheye_rig(96), options);
+  const std::vector<double> of_bands = operations_of_bands(fixture.schedule()).at(Kernel::regress);
+  std::size_t band = 0;
+  for (const Dispatch& dispatch : fixture.schedule().dispatches) {
+    if (dispatch.kernel != Kernel::regress) continue;
+    const double operations = of_bands.at(band++);
+    if (dispatch.pass.first_view != 0) continue;  // whose grids the coarse images cut
+    const kernel::PassParameters& pass = dispatch.pass;
+    const auto rounds = pass.deviation > 0 ? REGRESSION_ROUNDS : NORMAL_ROUNDS;
+    const long of_fit = counts_of_fit(fixture, {48, 48}, pass.radius, pass.steps).operations;
+    EXPECT_GE(operations, 0.7 * static_cast<double>(rounds * of_fit));
+    EXPECT_LE(operations, 3.0 * static_cast<double>(rounds * of_fit));
+  }
+  EXPECT_EQ(band, of_bands.size());
+}
+
+TEST(Work, OfABandGrowsWithTheVoters) {
+  const auto of_vote = [](int radius) {
+    Options options = Options::preset_named("fast");
+    options.vote_radius = radius;
+    return operations_of_bands(make_schedule(fisheye_rig(96), options)).at(Kernel::vote).front();
+  };
+  // Each compares its plane with the pixel's own and 16 others: a difference, its scale, two
+  // squares and what is added, five operations or more for each.
+  EXPECT_GE(of_vote(30) - of_vote(9), (21 * 21 - 7 * 7) * 17 * 5);
+  EXPECT_LE(of_vote(30) - of_vote(9), (21 * 21 - 7 * 7) * 17 * 20);
 }
 
 TEST(Work, OfAScheduleAddsUp) {
