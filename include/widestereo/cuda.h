@@ -48,8 +48,8 @@ class CudaMatcher {
   /// Allocates all memory, compiles nothing and waits for the device. With `current_device` the
   /// same context must be current in every later call, the destructor included; with an ordinal of
   /// the CUDA runtime its primary context is used and the thread's current device is left as it
-  /// was. Throws Error when the rig, the options or the device do not do, or CUDA is not in this
-  /// build.
+  /// was; where contexts made by cuCtxCreate() may be current, give `current_device`. Throws Error
+  /// when the rig, the options or the device do not do, or CUDA is not in this build.
   CudaMatcher(const Rig& rig, const Options& options, int device = current_device);
   /// The work enqueued must have finished.
   ~CudaMatcher();

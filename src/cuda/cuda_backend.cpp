@@ -13,6 +13,8 @@
 namespace widestereo {
 namespace {
 
+constexpr dim3 threads_of_block(kernel::cuda::block_width, kernel::cuda::block_height);
+
 std::size_t area(cv::Size size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }
@@ -28,30 +30,31 @@ bool same_launches(const Schedule& a, const Schedule& b) {
                     });
 }
 
-/// Ends a capture that an exception left open, so that the stream is usable again.
-class Capture {
+/// A graph of nodes that follow each other. It is built rather than captured: a wait for the
+/// device, in whichever thread, ends a capture.
+class Chain {
  public:
-  explicit Capture(cudaStream_t stream) : stream_(stream) {}
-  ~Capture() {
-    if (stream_ != nullptr) end();
-  }
-  Capture(const Capture&) = delete;
-  Capture& operator=(const Capture&) = delete;
-  cudaError_t begin() {
-    const cudaError_t result = cudaStreamBeginCapture(stream_, cudaStreamCaptureModeThreadLocal);
-    if (result != cudaSuccess) stream_ = nullptr;
+  cudaError_t create() {
+    cudaGraph_t graph = nullptr;
+    const cudaError_t result = cudaGraphCreate(&graph, 0);
+    graph_.reset(graph);
     return result;
   }
-  CudaGraph end() {
-    cudaGraph_t graph = nullptr;
-    result_ = cudaStreamEndCapture(std::exchange(stream_, nullptr), &graph);
-    return CudaGraph(graph);
+  cudaError_t add(const cudaKernelNodeParams& launch) {
+    const cudaGraphNode_t before = last_;
+    return cudaGraphAddKernelNode(&last_, graph_.get(), &before, before != nullptr ? 1 : 0,
+                                  &launch);
   }
-  cudaError_t result() const { return result_; }
+  cudaError_t add(cudaEvent_t event) {
+    const cudaGraphNode_t before = last_;
+    return cudaGraphAddEventRecordNode(&last_, graph_.get(), &before, before != nullptr ? 1 : 0,
+                                       event);
+  }
+  cudaGraph_t get() const { return graph_.get(); }
 
  private:
-  cudaStream_t stream_;
-  cudaError_t result_ = cudaSuccess;
+  CudaGraph graph_;
+  cudaGraphNode_t last_ = nullptr;
 };
 
 }  // namespace
@@ -64,10 +67,16 @@ CudaBackend::CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
                 std::to_string(MAX_VIEWS) + " are possible.");
   }
   const CurrentDevice current = make_current();
-  cudaStream_t stream = nullptr;
-  check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "make a stream");
-  stream_.reset(stream);
-  make_maps();
+  try {
+    cudaStream_t stream = nullptr;
+    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "make a stream");
+    stream_.reset(stream);
+    make_maps();
+    check(cudaStreamSynchronize(stream), "clear the maps");
+  } catch (...) {
+    release();  // while the device is current
+    throw;
+  }
   context_.camera_model = constants.camera_model;
   context_.window_radius = constants.window_radius;
   context_.warp = constants.warp;
@@ -75,23 +84,25 @@ CudaBackend::CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
   context_.weighted = constants.weighted;
   context_.filter = constants.filter;
   context_.source_count = constants.source_count;
-  // The maps were cleared on the default stream, which the others do not wait for.
-  check(cudaDeviceSynchronize(), "clear the maps");
 }
 
 CudaBackend::~CudaBackend() {
   try {
     const CurrentDevice current = make_current();
     cudaStreamSynchronize(stream_.get());
-    prepared_.clear();
-    of_run_ = {};
-    events_.clear();
-    maps_.clear();
-    transfer_nearest_ = {};
-    transfer_winner_ = {};
-    stream_.reset();
+    release();
   } catch (const Error&) {  // the device is lost and its memory with it
   }
+}
+
+void CudaBackend::release() {
+  prepared_.clear();
+  of_run_ = {};
+  events_.clear();
+  maps_.clear();
+  transfer_nearest_ = {};
+  transfer_winner_ = {};
+  stream_.reset();
 }
 
 void CudaBackend::check(cudaError_t result, const char* action) const {
@@ -103,14 +114,15 @@ void CudaBackend::make_maps() {
   for (const cv::Size& size : sizes_) {
     const std::size_t pixels = area(size);
     const std::string& name = target_.name;
+    const cudaStream_t stream = stream_.get();
     ViewMaps& maps = maps_.emplace_back();
-    maps.rays = DeviceArray<float4>(pixels, name, "the viewing rays");
-    maps.intensities = DeviceImage(with_apron(size), APRON, name);
-    maps.half_pixels = DeviceImage(size_of_half_pixels(size), HALF_PIXEL_APRON, name);
+    maps.rays = DeviceArray<float4>(pixels, stream, name, "the viewing rays");
+    maps.intensities = DeviceImage(with_apron(size), APRON, stream, name);
+    maps.half_pixels = DeviceImage(size_of_half_pixels(size), HALF_PIXEL_APRON, stream, name);
     maps.texture = maps.half_pixels.make_texture(name);
-    maps.hypotheses = DeviceArray<float4>(pixels, name, "the planes");
-    maps.checks = DeviceArray<float4>(pixels, name, "the consistency maps");
-    maps.priors = DeviceArray<float4>(pixels, name, "the planes' priors");
+    maps.hypotheses = DeviceArray<float4>(pixels, stream, name, "the planes");
+    maps.checks = DeviceArray<float4>(pixels, stream, name, "the consistency maps");
+    maps.priors = DeviceArray<float4>(pixels, stream, name, "the planes' priors");
     context_.views[maps_.size() - 1] = {maps.rays.get(),           maps.intensities.get(),
                                         maps.half_pixels.get(),    maps.texture.get(),
                                         maps.hypotheses.get(),     maps.checks.get(),
@@ -118,9 +130,11 @@ void CudaBackend::make_maps() {
                                         maps.intensities.stride(), maps.half_pixels.stride()};
     largest = std::max(largest, pixels);
   }
-  transfer_nearest_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
-  transfer_winner_ = DeviceArray<unsigned>(largest, target_.name, "a transfer buffer");
-  of_run_.parameters = DeviceArray<kernel::MatchParameters>(1, target_.name, "the parameters");
+  transfer_nearest_ =
+      DeviceArray<unsigned>(largest, stream_.get(), target_.name, "a transfer buffer");
+  transfer_winner_ =
+      DeviceArray<unsigned>(largest, stream_.get(), target_.name, "a transfer buffer");
+  of_run_.parameters = make_parameters();
   context_.transfer_nearest = transfer_nearest_.get();
   context_.transfer_winner = transfer_winner_.get();
 }
@@ -184,21 +198,29 @@ void CudaBackend::set_parameters(Prepared& prepared, const Schedule& schedule) {
         "receive the parameters");
 }
 
-void CudaBackend::launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const {
+DeviceArray<kernel::MatchParameters> CudaBackend::make_parameters() const {
+  return {1, stream_.get(), target_.name, "the parameters"};
+}
+
+CudaBackend::Launch CudaBackend::launch_of(const Prepared& prepared, const Band& band) const {
   const Dispatch& dispatch = *band.dispatch;
-  kernel::cuda::Context context = context_;
-  context.parameters = prepared.parameters.get();
-  context.pass = dispatch.pass;
-  context.pass.first_row = band.first_row;
-  context.pass.last_row = band.last_row;
+  Launch launch{kernel_function(dispatch.kernel, constants_), {}, context_};
+  launch.context.parameters = prepared.parameters.get();
+  launch.context.pass = dispatch.pass;
+  launch.context.pass.first_row = band.first_row;
+  launch.context.pass.last_row = band.last_row;
   const LaunchGrid grid =
       launch_grid(dispatch.width, band.last_row - band.first_row, dispatch.pass.colour);
-  std::array<void*, 1> arguments = {&context};
-  check(cudaLaunchKernel(kernel_function(dispatch.kernel, constants_),
-                         dim3(grid.columns, grid.rows, static_cast<unsigned>(dispatch.views)),
-                         dim3(kernel::cuda::block_width, kernel::cuda::block_height),
-                         arguments.data(), 0, stream),
-        (std::string("launch the kernel ") + to_string(dispatch.kernel)).c_str());
+  launch.blocks = dim3(grid.columns, grid.rows, static_cast<unsigned>(dispatch.views));
+  return launch;
+}
+
+void CudaBackend::launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const {
+  Launch launch = launch_of(prepared, band);
+  std::array<void*, 1> arguments = {&launch.context};
+  check(
+      cudaLaunchKernel(launch.kernel, launch.blocks, threads_of_block, arguments.data(), 0, stream),
+      (std::string("launch the kernel ") + to_string(band.dispatch->kernel)).c_str());
 }
 
 std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {
@@ -207,27 +229,22 @@ std::vector<Band> CudaBackend::bands_of(const Schedule& schedule) const {
                                         : std::numeric_limits<long long>::max());
 }
 
-std::vector<CudaBackend::Stretch> CudaBackend::launch_all(const Prepared& prepared,
-                                                          std::span<const Band> bands,
-                                                          Events events, unsigned record_flags) {
+template <class OnBand, class OnEvent>
+std::vector<CudaBackend::Stretch> CudaBackend::in_stretches(std::span<const Band> bands,
+                                                            bool each_band, const OnBand& on_band,
+                                                            const OnEvent& on_event) const {
   std::vector<Stretch> stretches;
-  const auto record = [&] {
-    if (events == Events::none) return;
-    check(cudaEventRecordWithFlags(events_.at(stretches.size()).get(), stream_.get(), record_flags),
-          "record an event");
-  };
   for (const Band& band : bands) {
     const Kernel kernel = band.dispatch->kernel;
-    if (stretches.empty() || stretches.back().kernel != kernel ||
-        events == Events::between_launches) {
-      record();
+    if (stretches.empty() || stretches.back().kernel != kernel || each_band) {
+      on_event(stretches.size());
       stretches.push_back({kernel, 0, 0});
     }
     if (band.first_row == 0) ++stretches.back().dispatches;
     stretches.back().samples += band.samples;
-    launch(prepared, band, stream_.get());
+    on_band(band);
   }
-  record();
+  on_event(stretches.size());
   return stretches;
 }
 
@@ -244,19 +261,28 @@ void CudaBackend::load_kernels(const Schedule& schedule, std::size_t events) {
   }
 }
 
-void CudaBackend::make_graph(Prepared& prepared, Events events) {
+void CudaBackend::make_graph(Prepared& prepared, bool timed) {
   prepared.graph.reset();
   const std::vector<Band> bands = bands_of(prepared.schedule);
-  // Nothing but launches while capturing.
-  load_kernels(prepared.schedule, events == Events::none ? 0 : bands.size() + 1);
-  Capture capture(stream_.get());
-  check(capture.begin(), "begin a graph");
-  // External: a node of the graph, so that each launch of the graph takes the time anew.
-  prepared.stretches = launch_all(prepared, bands, events, cudaEventRecordExternal);
-  const CudaGraph graph = capture.end();
-  check(capture.result(), "capture a graph");
+  load_kernels(prepared.schedule, timed ? bands.size() + 1 : 0);
+  Chain chain;
+  check(chain.create(), "begin a graph");
+  const auto add_kernel = [&](const Band& band) {
+    Launch launch = launch_of(prepared, band);
+    std::array<void*, 1> arguments = {&launch.context};
+    cudaKernelNodeParams node{};
+    node.func = const_cast<void*>(launch.kernel);
+    node.gridDim = launch.blocks;
+    node.blockDim = threads_of_block;
+    node.kernelParams = arguments.data();
+    check(chain.add(node), "add a kernel to a graph");
+  };
+  const auto add_event = [&](std::size_t i) {
+    if (timed) check(chain.add(events_.at(i).get()), "add an event to a graph");
+  };
+  prepared.stretches = in_stretches(bands, false, add_kernel, add_event);
   cudaGraphExec_t exec = nullptr;
-  check(cudaGraphInstantiateWithFlags(&exec, graph.get(), 0), "make a graph");
+  check(cudaGraphInstantiateWithFlags(&exec, chain.get(), 0), "make a graph");
   prepared.graph.reset(exec);
 }
 
@@ -267,13 +293,16 @@ void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progres
   if (progress) {
     const std::vector<Band> bands = bands_of(schedule);
     load_kernels(schedule, bands.size() + 1);
-    collect(launch_all(of_run_, bands, Events::between_launches, cudaEventRecordDefault), schedule,
-            progress);
+    const auto launch_band = [&](const Band& band) { launch(of_run_, band, stream_.get()); };
+    const auto record = [&](std::size_t i) {
+      check(cudaEventRecord(events_.at(i).get(), stream_.get()), "record an event");
+    };
+    collect(in_stretches(bands, true, launch_band, record), schedule, progress);
   } else {
     if (of_run_.graph == nullptr || !same_launches(of_run_.schedule, schedule)) {
       of_run_.graph.reset();
       of_run_.schedule = schedule;
-      make_graph(of_run_, Events::between_kernels);
+      make_graph(of_run_, true);
     }
     check(cudaGraphLaunch(of_run_.graph.get(), stream_.get()), "launch a match");
     collect(of_run_.stretches, schedule, progress);
@@ -299,11 +328,11 @@ std::size_t CudaBackend::prepare(const Schedule& schedule) {
   const CurrentDevice current = make_current();
   Prepared prepared;
   prepared.schedule = schedule;
-  prepared.parameters = DeviceArray<kernel::MatchParameters>(1, target_.name, "the parameters");
-  // They were cleared on the default stream, which the others do not wait for.
-  check(cudaDeviceSynchronize(), "prepare a match");
+  prepared.parameters = make_parameters();
   set_parameters(prepared, schedule);
-  make_graph(prepared, Events::none);
+  make_graph(prepared, false);
+  // Or the first launch would, and might allocate for it.
+  check(cudaGraphUpload(prepared.graph.get(), stream_.get()), "prepare a match");
   check(cudaStreamSynchronize(stream_.get()), "prepare a match");
   prepared_.push_back(std::move(prepared));
   return prepared_.size() - 1;

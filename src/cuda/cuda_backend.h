@@ -58,7 +58,11 @@ class CudaBackend final : public Backend {
     int dispatches = 0;
     long long samples = 0;
   };
-  enum class Events { none, between_kernels, between_launches };
+  struct Launch {
+    const void* kernel;
+    dim3 blocks;
+    kernel::cuda::Context context;  // its argument
+  };
   /// A schedule's launches as one graph, which read parameters that may change.
   struct Prepared {
     Schedule schedule;
@@ -70,16 +74,23 @@ class CudaBackend final : public Backend {
   CurrentDevice make_current() const { return CurrentDevice(target_.ordinal, target_.name); }
   void check(cudaError_t result, const char* action) const;
   void make_maps();
+  DeviceArray<kernel::MatchParameters> make_parameters() const;
+  void release();
   /// `stride`: pixels of the memory from row to row.
   void upload(void* memory, int stride, int view, const cv::Mat& map, int type);
   cv::Mat download(const void* memory, int view);
   void set_parameters(Prepared& prepared, const Schedule& schedule);
   std::vector<Band> bands_of(const Schedule& schedule) const;
   void load_kernels(const Schedule& schedule, std::size_t events);
-  std::vector<Stretch> launch_all(const Prepared& prepared, std::span<const Band> bands,
-                                  Events events, unsigned record_flags);
+  /// Calls `on_band` for each band, and `on_event` with the number of each stretch before it and
+  /// once more after the last. `each_band` is a stretch, or all of a kernel that follow each other.
+  template <class OnBand, class OnEvent>
+  std::vector<Stretch> in_stretches(std::span<const Band> bands, bool each_band,
+                                    const OnBand& on_band, const OnEvent& on_event) const;
+  Launch launch_of(const Prepared& prepared, const Band& band) const;
   void launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const;
-  void make_graph(Prepared& prepared, Events events);
+  /// `timed`: with events between kernels.
+  void make_graph(Prepared& prepared, bool timed);
   /// Waits for a run and notes its times.
   void collect(std::span<const Stretch> stretches, const Schedule& schedule,
                const Matcher::Progress& progress);

@@ -7,17 +7,19 @@
 
 namespace widestereo {
 
-DeviceImage::DeviceImage(cv::Size size, int apron, const std::string& device)
+DeviceImage::DeviceImage(cv::Size size, int apron, cudaStream_t stream, const std::string& device)
     : size_(size), apron_(apron) {
   // Rows of whole cache lines, which are also what textures ask for.
   constexpr int line = 128 / sizeof(float);
   stride_ = (size.width + line - 1) / line * line;
   const std::size_t count =
       static_cast<std::size_t>(stride_) * static_cast<std::size_t>(size.height);
-  memory_ = DeviceArray<float>(count, device, "the images");
+  memory_ = DeviceArray<float>(count, stream, device, "the images");
   const std::vector<float> masked(count, MASKED_INTENSITY);
-  check(cudaMemcpy(memory_.get(), masked.data(), memory_.bytes(), cudaMemcpyHostToDevice), device,
-        "clear the images");
+  check(cudaMemcpyAsync(memory_.get(), masked.data(), memory_.bytes(), cudaMemcpyHostToDevice,
+                        stream),
+        device, "clear the images");
+  check(cudaStreamSynchronize(stream), device, "clear the images");
 }
 
 CudaTexture DeviceImage::make_texture(const std::string& device) const {

@@ -15,7 +15,7 @@ class DeviceImage {
   DeviceImage() = default;
   /// `size`: with the aprons of this many pixels on every side. Throws Error naming the device. The
   /// memory may be filled after the constructor returns, on the default stream.
-  DeviceImage(cv::Size size, int apron, const std::string& device);
+  DeviceImage(cv::Size size, int apron, cudaStream_t stream, const std::string& device);
 
   /// Of pixel (0, 0).
   float* get() const { return memory_.get() + (stride_ + 1) * apron_; }

@@ -69,19 +69,21 @@ class CudaTexture {
   cudaTextureObject_t object_ = 0;
 };
 
-/// Device memory of a number of T, all zero.
+/// Device memory of a number of T, which the stream makes all zero. Nothing here waits for the
+/// whole device or uses its default stream: that would end what other threads capture on it.
 template <class T>
 class DeviceArray {
  public:
   DeviceArray() = default;
-  DeviceArray(std::size_t count, const std::string& device, const std::string& purpose)
+  DeviceArray(std::size_t count, cudaStream_t stream, const std::string& device,
+              const std::string& purpose)
       : bytes_(count * sizeof(T)) {
     void* memory = nullptr;
     const std::string action =
         "allocate " + std::to_string((bytes_ >> 20) + 1) + " MiB for " + purpose;
     check(cudaMalloc(&memory, bytes_), device, action);
     memory_.reset(static_cast<T*>(memory));
-    check(cudaMemset(memory, 0, bytes_), device, "clear " + purpose);
+    check(cudaMemsetAsync(memory, 0, bytes_, stream), device, "clear " + purpose);
   }
 
   T* get() const { return memory_.get(); }

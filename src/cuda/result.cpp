@@ -23,7 +23,7 @@ std::string explain(cudaError_t result) {
              "the mode with nvidia-smi -c 0" +
              name + ".";
     case cudaErrorLaunchTimeout:
-      return "a kernel ran into the display's time limit; open the device again with smaller "
+      return "a kernel ran into the display's time limit; restart the program with smaller "
              "dispatches (max_samples_per_dispatch).";
     // After these nothing works on the device until the process ends.
     case cudaErrorIllegalAddress:

@@ -10,6 +10,7 @@
 #include <map>
 #include <opencv2/core/utility.hpp>
 #include <set>
+#include <thread>
 #include <vector>
 
 using widestereo::test::emulation;
@@ -19,20 +20,25 @@ using Clock = std::chrono::steady_clock;
 __thread dim3 blockIdx;
 __thread dim3 threadIdx;
 
+struct CUgraphNode_st {
+  Work work;
+  CUevent_st* event = nullptr;  // which it records
+};
+/// A chain: each node follows the one before.
 struct CUgraph_st {
-  std::vector<Work> nodes;
+  std::deque<CUgraphNode_st> nodes;
 };
 struct CUgraphExec_st {
-  std::vector<Work> nodes;
+  std::deque<CUgraphNode_st> nodes;
 };
 struct CUstream_st {
   std::deque<Work> queue;
   bool blocking = true;
   CUgraph_st* capturing = nullptr;
+  std::thread::id capturing_thread;
 };
 struct CUevent_st {
   CUstream_st* stream = nullptr;  // of the last record or of the launch of the graph with it
-  int pending = 0;
   bool recorded = false;
   Clock::time_point time;
 };
@@ -65,11 +71,21 @@ void run_everything() {
   for (CUstream_st* stream : streams()) run_all(*stream);
 }
 
-bool anything_captures() {
+template <class Condition>
+bool any_capture(Condition condition) {
   for (const CUstream_st* stream : streams()) {
-    if (stream->capturing != nullptr) return true;
+    if (stream->capturing != nullptr && condition(*stream)) return true;
   }
   return false;
+}
+bool this_thread_captures() {
+  return any_capture([](const CUstream_st& stream) {
+    return stream.capturing_thread == std::this_thread::get_id();
+  });
+}
+/// Streams that wait for the default stream must not capture while it is used.
+bool a_blocking_stream_captures() {
+  return any_capture([](const CUstream_st& stream) { return stream.blocking; });
 }
 
 /// The result of a call that can fail.
@@ -82,13 +98,18 @@ cudaError_t step() {
 }
 /// Likewise, of one that must not be made while this thread captures.
 cudaError_t step_outside_capture() {
-  return anything_captures() ? cudaErrorStreamCaptureUnsupported : step();
+  return this_thread_captures() ? cudaErrorStreamCaptureUnsupported : step();
+}
+/// Likewise, of one that uses the default stream.
+cudaError_t step_on(cudaStream_t stream) {
+  return stream == nullptr && a_blocking_stream_captures() ? cudaErrorStreamCaptureUnsupported
+                                                           : step_outside_capture();
 }
 
 void enqueue(cudaStream_t stream, Work work) {
   CUstream_st* target = resolve(stream);
   if (target->capturing != nullptr) {
-    target->capturing->nodes.push_back(std::move(work));
+    target->capturing->nodes.push_back({std::move(work)});
   } else {
     target->queue.push_back(std::move(work));
   }
@@ -100,6 +121,60 @@ void copy_rows(void* to, std::size_t to_pitch, const void* from, std::size_t fro
     std::memcpy(static_cast<char*>(to) + y * to_pitch,
                 static_cast<const char*>(from) + y * from_pitch, width);
   }
+}
+
+/// What a launch will do, with copies of its arguments.
+cudaError_t bind_launch(const void* function, dim3 grid, dim3 block, void** arguments, Work& work) {
+  constexpr unsigned largest_grid_height = 65535;  // and depth
+  constexpr unsigned largest_block = 1024;
+  const bool legal = grid.x > 0 && grid.y > 0 && grid.z > 0 && grid.y <= largest_grid_height &&
+                     grid.z <= largest_grid_height && block.z == 1 && block.x * block.y > 0 &&
+                     block.x * block.y <= largest_block;
+  if (!legal) return cudaErrorInvalidValue;
+  const widestereo::test::ThreadFunction thread =
+      widestereo::test::bind_kernel(function, arguments);
+  if (!thread) return cudaErrorInvalidDeviceFunction;
+  if (const cudaError_t error = step()) return error;
+  work = [=] {
+    ++emulation().kernels_run;
+    const bool backwards = emulation().backwards;
+    const auto place = [backwards](unsigned i, unsigned count) {
+      return backwards ? count - 1 - i : i;
+    };
+    const unsigned all_rows = grid.y * grid.z;
+    const unsigned threads = block.x * block.y;
+    cv::parallel_for_(cv::Range(0, static_cast<int>(all_rows)), [&](const cv::Range& rows) {
+      for (int row = rows.start; row < rows.end; ++row) {
+        const unsigned y = place(static_cast<unsigned>(row), all_rows);
+        for (unsigned x = 0; x < grid.x; ++x) {
+          blockIdx = dim3(place(x, grid.x), y % grid.y, y / grid.y);
+          for (unsigned i = 0; i < threads; ++i) {
+            const unsigned thread_of_block = place(i, threads);
+            threadIdx = dim3(thread_of_block % block.x, thread_of_block / block.x);
+            thread();
+          }
+        }
+      }
+    });
+  };
+  return cudaSuccess;
+}
+
+Work record_of(CUevent_st* event) {
+  return [event] {
+    event->recorded = true;
+    event->time = Clock::now();
+  };
+}
+void await_record(CUevent_st& event, cudaStream_t stream) {
+  event.stream = resolve(stream);
+  event.recorded = false;
+}
+
+/// Whether a new node's predecessor is the graph's last one.
+bool follows(const CUgraph_st& graph, const cudaGraphNode_t* before, std::size_t count) {
+  if (graph.nodes.empty()) return count == 0;
+  return count == 1 && *before == &graph.nodes.back();
 }
 
 }  // namespace
@@ -168,7 +243,11 @@ cudaError_t cudaSetDevice(int device) {
   return step();
 }
 cudaError_t cudaDeviceSynchronize() {
-  if (const cudaError_t error = step_outside_capture()) return error;
+  // In whichever thread and mode.
+  if (any_capture([](const CUstream_st&) { return true; })) {
+    return cudaErrorStreamCaptureUnsupported;
+  }
+  if (const cudaError_t error = step()) return error;
   run_everything();
   return cudaSuccess;
 }
@@ -205,8 +284,11 @@ cudaError_t cudaFree(void* memory) {
   return cudaSuccess;
 }
 cudaError_t cudaMemset(void* memory, int value, std::size_t bytes) {
-  if (const cudaError_t error = step_outside_capture()) return error;
-  enqueue(nullptr, [=] { std::memset(memory, value, bytes); });
+  return cudaMemsetAsync(memory, value, bytes, nullptr);
+}
+cudaError_t cudaMemsetAsync(void* memory, int value, std::size_t bytes, cudaStream_t stream) {
+  if (const cudaError_t error = step_on(stream)) return error;
+  enqueue(stream, [=] { std::memset(memory, value, bytes); });
   return cudaSuccess;
 }
 cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind,
@@ -216,7 +298,7 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
 cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from,
                               std::size_t from_pitch, std::size_t width, std::size_t height,
                               cudaMemcpyKind kind, cudaStream_t stream) {
-  if (const cudaError_t error = step_outside_capture()) return error;
+  if (const cudaError_t error = step_on(stream)) return error;
   if (width > to_pitch || width > from_pitch) return cudaErrorInvalidValue;
   // Ordinary host memory is filled, or staged, before the call returns.
   if (kind == cudaMemcpyDeviceToHost) {
@@ -302,11 +384,12 @@ cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
   if (stream == nullptr || stream->capturing != nullptr) return cudaErrorInvalidValue;
   if (const cudaError_t error = step()) return error;
   stream->capturing = new CUgraph_st;
+  stream->capturing_thread = std::this_thread::get_id();
   ++emulation().live_objects;
   return cudaSuccess;
 }
 cudaError_t cudaStreamIsCapturing(cudaStream_t stream, cudaStreamCaptureStatus* status) {
-  if (stream == nullptr && anything_captures()) return cudaErrorStreamCaptureUnsupported;
+  if (stream == nullptr && a_blocking_stream_captures()) return cudaErrorStreamCaptureUnsupported;
   *status = stream != nullptr && stream->capturing != nullptr ? cudaStreamCaptureStatusActive
                                                               : cudaStreamCaptureStatusNone;
   return step();
@@ -318,6 +401,35 @@ cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
     cudaGraphDestroy(std::exchange(*graph, nullptr));
     return error;
   }
+  return cudaSuccess;
+}
+cudaError_t cudaGraphCreate(cudaGraph_t* graph, unsigned flags) {
+  if (flags != 0) return cudaErrorInvalidValue;
+  if (const cudaError_t error = step()) return error;
+  *graph = new CUgraph_st;
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaGraphAddKernelNode(cudaGraphNode_t* node, cudaGraph_t graph,
+                                   const cudaGraphNode_t* before, std::size_t count,
+                                   const cudaKernelNodeParams* launch) {
+  if (!follows(*graph, before, count)) return cudaErrorInvalidValue;
+  Work work;
+  if (const cudaError_t error = bind_launch(launch->func, launch->gridDim, launch->blockDim,
+                                            launch->kernelParams, work)) {
+    return error;
+  }
+  graph->nodes.push_back({std::move(work)});
+  *node = &graph->nodes.back();
+  return cudaSuccess;
+}
+cudaError_t cudaGraphAddEventRecordNode(cudaGraphNode_t* node, cudaGraph_t graph,
+                                        const cudaGraphNode_t* before, std::size_t count,
+                                        cudaEvent_t event) {
+  if (!follows(*graph, before, count)) return cudaErrorInvalidValue;
+  if (const cudaError_t error = step()) return error;
+  graph->nodes.push_back({record_of(event), event});
+  *node = &graph->nodes.back();
   return cudaSuccess;
 }
 cudaError_t cudaGraphDestroy(cudaGraph_t graph) {
@@ -333,10 +445,14 @@ cudaError_t cudaGraphInstantiateWithFlags(cudaGraphExec_t* exec, cudaGraph_t gra
   ++emulation().graphs_made;
   return cudaSuccess;
 }
+cudaError_t cudaGraphUpload(cudaGraphExec_t, cudaStream_t stream) { return step_on(stream); }
 cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
   if (resolve(stream)->capturing != nullptr) return cudaErrorStreamCaptureUnsupported;
   if (const cudaError_t error = step()) return error;
-  for (const Work& node : exec->nodes) enqueue(stream, node);
+  for (const CUgraphNode_st& node : exec->nodes) {
+    if (node.event != nullptr) await_record(*node.event, stream);
+    enqueue(stream, node.work);
+  }
   return cudaSuccess;
 }
 cudaError_t cudaGraphExecDestroy(cudaGraphExec_t exec) {
@@ -357,19 +473,12 @@ cudaError_t cudaEventDestroy(cudaEvent_t event) {
   --emulation().live_objects;
   return cudaSuccess;
 }
-cudaError_t cudaEventRecordWithFlags(cudaEvent_t event, cudaStream_t stream, unsigned flags) {
-  CUstream_st* target = resolve(stream);
-  // Without the flag it would be a dependency of the capture, not a node of the graph.
-  if (target->capturing != nullptr && flags != cudaEventRecordExternal)
-    return cudaErrorInvalidValue;
-  if (target->capturing == nullptr && flags != cudaEventRecordDefault) return cudaErrorInvalidValue;
+cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream) {
+  // It would be a dependency of the capture, not a node of the graph.
+  if (resolve(stream)->capturing != nullptr) return cudaErrorInvalidValue;
   if (const cudaError_t error = step()) return error;
-  event->stream = target;
-  event->recorded = false;
-  enqueue(stream, [event] {
-    event->recorded = true;
-    event->time = Clock::now();
-  });
+  await_record(*event, stream);
+  enqueue(stream, record_of(event));
   return cudaSuccess;
 }
 cudaError_t cudaEventSynchronize(cudaEvent_t event) {
@@ -394,31 +503,8 @@ cudaError_t cudaFuncGetAttributes(cudaFuncAttributes*, const void*) {
 }
 cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void** arguments,
                              std::size_t, cudaStream_t stream) {
-  constexpr unsigned largest_grid_height = 65535;  // and depth
-  constexpr unsigned largest_block = 1024;
-  const bool legal = grid.x > 0 && grid.y > 0 && grid.z > 0 && grid.y <= largest_grid_height &&
-                     grid.z <= largest_grid_height && block.z == 1 && block.x * block.y > 0 &&
-                     block.x * block.y <= largest_block;
-  if (!legal) return cudaErrorInvalidValue;
-  const widestereo::test::ThreadFunction thread =
-      widestereo::test::bind_kernel(function, arguments);
-  if (!thread) return cudaErrorInvalidDeviceFunction;
-  if (const cudaError_t error = step()) return error;
-  enqueue(stream, [=] {
-    ++emulation().kernels_run;
-    const int all_rows = static_cast<int>(grid.y * grid.z);
-    cv::parallel_for_(cv::Range(0, all_rows), [&](const cv::Range& rows) {
-      for (int row = rows.start; row < rows.end; ++row) {
-        for (unsigned x = 0; x < grid.x; ++x) {
-          const auto y = static_cast<unsigned>(row);
-          blockIdx = dim3(x, y % grid.y, y / grid.y);
-          for (unsigned i = 0; i < block.x * block.y; ++i) {
-            threadIdx = dim3(i % block.x, i / block.x);
-            thread();
-          }
-        }
-      }
-    });
-  });
+  Work work;
+  if (const cudaError_t error = bind_launch(function, grid, block, arguments, work)) return error;
+  enqueue(stream, std::move(work));
   return cudaSuccess;
 }

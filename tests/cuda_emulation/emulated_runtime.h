@@ -26,6 +26,8 @@ struct Emulation {
   cudaError_t failure = cudaSuccess;
   bool sticky = false;  ///< and every one after it
 
+  bool backwards = false;  ///< of each launch the last block and its last thread come first
+
   long calls = 0;
   int current_device = 0;
   std::size_t allocated = 0;

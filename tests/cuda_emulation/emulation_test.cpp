@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <opencv2/core.hpp>
+#include <thread>
 
 #include "cuda/cuda_device.h"
 #include "cuda/cuda_target.h"
@@ -94,6 +96,66 @@ TEST_F(CudaEmulation, TheDeviceMayBeLostAtAnyCall) {
 
 TEST_F(CudaEmulation, TheDeviceMayBeLostAtAnyCallOfAnApplication) {
   fail_every_call([this] { match_in_application(); }, cudaErrorIllegalAddress, true);
+}
+
+TEST_F(CudaEmulation, OtherThreadsMayCaptureMeanwhile) {
+  cudaStream_t stream = nullptr;  // waits for the default stream, as most do
+  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+  std::string error;
+  std::thread([&] {
+    error = error_of([this] {
+      match();
+      const CudaMatcher matcher(rig_, options_);
+    });
+  }).join();
+  EXPECT_EQ(error, "");
+  cudaGraph_t graph = nullptr;
+  EXPECT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+  cudaGraphDestroy(graph);
+  cudaStreamDestroy(stream);
+}
+
+/// Nothing that a thread writes may be read by another one of the launch: compute-sanitizer looks
+/// for races in shared memory alone.
+TEST_F(CudaEmulation, TheOrderOfThreadsDoesNotMatter) {
+  Device device = Device::open("cuda");
+  for (const char* preset : {"paper", "fast", "quality"}) {
+    Options options = Options::preset_named(preset);
+    options.first_iterations = 2;
+    options.sweep_steps = 8;
+    options.fill_radius = 8;
+    for (const int views : {2, 3}) {
+      SCOPED_TRACE(testing::Message() << preset << views);
+      Rig rig = fisheye_rig(40);
+      std::vector<cv::Mat> images;
+      for (int i = 0; i < views; ++i) {
+        cv::Mat image;
+        smooth_noise({40, 40}, 7).convertTo(image, CV_8U, 255);
+        images.push_back(image);
+      }
+      if (views == 3) {
+        rig.views.push_back(rig.views[1]);
+        rig.views[2].world_from_camera.translation() *= -0.7;
+      }
+      const auto results = [&](bool backwards) {
+        emulation().backwards = backwards;
+        Matcher matcher(device, rig, options);
+        return std::array{matcher.match(images), matcher.match_next(images, {})};
+      };
+      const auto forwards = results(false);
+      const auto backwards = results(true);
+      for (std::size_t frame = 0; frame < 2; ++frame) {
+        for (std::size_t i = 0; i < images.size(); ++i) {
+          const ViewResult& expected = forwards[frame].views[i];
+          const ViewResult& found = backwards[frame].views[i];
+          EXPECT_EQ(cv::norm(found.hypotheses, expected.hypotheses, cv::NORM_INF), 0);
+          EXPECT_EQ(cv::norm(found.confidence, expected.confidence, cv::NORM_INF), 0);
+          EXPECT_GT(cv::countNonZero(expected.distance), 400);
+        }
+      }
+    }
+  }
 }
 
 TEST_F(CudaEmulation, AMatcherSurvivesAFailedRun) {
