@@ -116,6 +116,8 @@ void run_benchmark(BenchmarkArguments a) {
       if (device.unusable.empty()) a.devices.push_back(device.id);
     }
   }
+  // One that cannot be opened is refused before others take their time.
+  for (const std::string& name : a.devices) ws::Device::open(name);
   Json rows = Json::array();
   std::vector<PlotBar> bars;
   if (!a.as_json) print_header(a.runs);

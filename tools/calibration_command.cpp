@@ -3,9 +3,9 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "commands.h"
+#include "geometry/angle.h"
 #include "json_text.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
@@ -19,8 +19,6 @@
 namespace ws = widestereo;
 
 namespace {
-
-constexpr double degrees = 180 / std::numbers::pi;
 
 struct CalibrationArguments {
   std::string file, output, format = "kalibr";
@@ -78,7 +76,7 @@ double field_of_view(const ws::Camera& camera, const Eigen::Vector2d& direction)
     }
     angle += reached;
   }
-  return angle * degrees;
+  return angle * ws::degrees_per_radian;
 }
 
 nlohmann::ordered_json describe(const ws::View& view) {
@@ -95,8 +93,8 @@ nlohmann::ordered_json describe(const ws::View& view) {
           {"horizontal_field_of_view_degrees", field_of_view(c, Eigen::Vector2d::UnitX())},
           {"vertical_field_of_view_degrees", field_of_view(c, Eigen::Vector2d::UnitY())},
           {"diagonal_field_of_view_degrees", field_of_view(c, diagonal)},
-          {"model_max_theta_degrees", model_max_theta(c) * degrees},
-          {"max_theta_degrees", c.max_theta * degrees}};
+          {"model_max_theta_degrees", model_max_theta(c) * ws::degrees_per_radian},
+          {"max_theta_degrees", c.max_theta * ws::degrees_per_radian}};
 }
 
 nlohmann::ordered_json describe(const ws::View& first, const ws::View& second) {
@@ -106,7 +104,7 @@ nlohmann::ordered_json describe(const ws::View& first, const ws::View& second) {
   return {{"first", first.name},
           {"second", second.name},
           {"baseline_metres", centre.norm()},
-          {"rotation_degrees", Eigen::AngleAxisd(motion.linear()).angle() * degrees},
+          {"rotation_degrees", Eigen::AngleAxisd(motion.linear()).angle() * ws::degrees_per_radian},
           {"direction_in_first", {direction.x(), direction.y(), direction.z()}}};
 }
 
@@ -114,7 +112,8 @@ nlohmann::ordered_json describe(const ws::View& first, const ws::View& second) {
 nlohmann::ordered_json describe_imu(const Eigen::Isometry3d& first_from_imu) {
   const Eigen::Vector3d position = first_from_imu.translation();
   return {{"position_in_first_metres", {position.x(), position.y(), position.z()}},
-          {"rotation_degrees", Eigen::AngleAxisd(first_from_imu.linear()).angle() * degrees}};
+          {"rotation_degrees",
+           Eigen::AngleAxisd(first_from_imu.linear()).angle() * ws::degrees_per_radian}};
 }
 
 void show(const CalibrationArguments& arguments) {

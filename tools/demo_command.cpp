@@ -42,7 +42,8 @@ void run_demo(DemoArguments arguments) {
   const auto [nearest, farthest] = ws::demo_distance_range();
   if (!arguments.settings.min_distance) arguments.settings.min_distance = nearest;
   if (!arguments.settings.max_distance) arguments.settings.max_distance = farthest;
-  arguments.format.require_room_for(*arguments.settings.max_distance);
+  arguments.format.require_room_for(*arguments.settings.min_distance,
+                                    *arguments.settings.max_distance);
 
   std::vector<cv::Mat> images;
   std::vector<ws::GroundTruth> truths;

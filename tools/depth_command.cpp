@@ -71,15 +71,18 @@ void run_depth(const DepthArguments& arguments) {
     images[i] = arguments.size.reduced(images[i], view, files[i]);
     view = arguments.size.reduced(view);
   }
+  const Eigen::Vector3d world_origin = move_near_origin(calibrated.rig.views);
   arguments.rig.leave_out_dark_rims(calibrated.rig, images);
   const MatchSettings settings =
       with_range(arguments.settings, calibrated, arguments.rig.calibration);
-  arguments.format.require_room_for(settings.options().max_distance);
+  const ws::Options options = settings.options();
+  arguments.format.require_room_for(options.min_distance, options.max_distance);
 
   const std::vector<double> blurs = arguments.sharpness.blurs(rig, images);
   const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);
   FolderContents contents{
       .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres, .blurs = blurs};
+  contents.world_origin = world_origin;
   contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,

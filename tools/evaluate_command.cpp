@@ -26,9 +26,11 @@ struct EvaluateArguments {
   bool as_json = false;
 };
 
-cv::Mat read_mask(const fs::path& path) {
+/// One for each pixel, in an 8-bit grey image: as GroundTruth has them.
+cv::Mat read_labels(const fs::path& path) {
   const cv::Mat image = ws::read_image(path);
-  if (image.type() != CV_8UC1) throw ws::Error(path.string() + " is not an 8-bit grey mask.");
+  if (image.type() != CV_8UC1)
+    throw ws::Error(path.string() + " is not an 8-bit grey image; convert it first.");
   return image;
 }
 
@@ -59,8 +61,8 @@ void run_evaluate(EvaluateArguments a) {
   }
   ws::GroundTruth truth;
   truth.distance = ws::read_map(a.truth);
-  if (!a.valid.empty()) truth.valid = read_mask(a.valid);
-  if (!a.occlusion.empty()) truth.occlusion = read_mask(a.occlusion);
+  if (!a.valid.empty()) truth.valid = read_labels(a.valid);
+  if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = ws::read_map(a.truth_normals);
   if (!a.image.empty()) truth.image = ws::read_grey_levels(a.image);
   if (!a.normals.empty() && a.truth_normals.empty()) {
@@ -70,7 +72,7 @@ void run_evaluate(EvaluateArguments a) {
     if (a.field_of_view.empty()) {
       throw ws::Error("--far-distance needs --field-of-view, or a folder with it by --set.");
     }
-    truth.field_of_view = read_mask(a.field_of_view);
+    truth.field_of_view = read_labels(a.field_of_view);
   }
   const cv::Mat prediction = ws::read_map(a.prediction);
   const cv::Mat normals = a.normals.empty() ? cv::Mat() : ws::read_map(a.normals);

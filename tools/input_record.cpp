@@ -10,6 +10,8 @@
 namespace ws = widestereo;
 using Json = nlohmann::ordered_json;
 
+Json to_json(const Eigen::Vector3d& position) { return {position.x(), position.y(), position.z()}; }
+
 Json to_json(const Eigen::Isometry3d& pose) {
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {

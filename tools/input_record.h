@@ -8,6 +8,7 @@
 
 #include "widestereo/rig.h"
 
+nlohmann::ordered_json to_json(const Eigen::Vector3d& position);
 /// The upper three rows, row by row.
 nlohmann::ordered_json to_json(const Eigen::Isometry3d& pose);
 /// Focal lengths, centre and what else differs from a default widestereo::Camera, by its names.

@@ -44,6 +44,7 @@ MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
   run.device = device.info();
   ws::Matcher matcher(device, rig, run.options);
   ws::prepare_output_folder(output);
+  run.lock = std::make_shared<const FolderLock>(output);
   {
     ProgressBar bar("Matching on " + device.info().name);
     run.result = matcher.match(images, [&bar](double share) { bar.show(share); });

@@ -3,18 +3,21 @@
 // over.
 #pragma once
 
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
+#include "folder_lock.h"
 #include "match_settings.h"
-#include "widestereo/sfm_model.h"
 #include "widestereo/matcher.h"
+#include "widestereo/sfm_model.h"
 
 struct MatchingRun {
   widestereo::Options options;
   widestereo::DeviceInfo device;
   widestereo::StereoResult result;
+  std::shared_ptr<const FolderLock> lock = nullptr;  ///< of the folder that it is written to
 };
 
 /// The settings with the range of distances of a reconstruction's points where none is given:
@@ -29,6 +32,6 @@ widestereo::Device open_device(const MatchSettings& settings);
 void require_no_validation_messages(const widestereo::Device& device);
 
 /// Throws Error also when validation was asked for and reported anything. Once nothing else can be
-/// wrong with the request, and before the work, the output folder is prepared.
+/// wrong with the request, and before the work, the output folder is prepared and locked.
 MatchingRun match_images(const MatchSettings& settings, const widestereo::Rig& rig,
                          const std::vector<cv::Mat>& images, const std::string& output);

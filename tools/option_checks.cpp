@@ -1,18 +1,32 @@
 // SPDX-License-Identifier: MIT
 #include "option_checks.h"
 
+#include <algorithm>
+
 #include "text/number.h"
 
 namespace {
 
-CLI::Validator word_check(bool of_number) {
+/// CLI11 takes 010 for 8 and 0x10 for 16, but frames are named with leading zeros.
+std::string make_decimal(std::string& word) {
+  const std::size_t sign = word.starts_with('-') || word.starts_with('+') ? 1 : 0;
+  if (word.size() == sign || word.find_first_not_of("0123456789", sign) != std::string::npos) {
+    return word + " is no whole number";
+  }
+  word.erase(sign, std::min(word.find_first_not_of('0', sign), word.size() - 1) - sign);
+  return "";
+}
+
+CLI::Validator word_check(const std::string& type) {
+  const bool of_number = type.starts_with("FLOAT");
+  const bool of_whole_number = type.starts_with("INT") || type.starts_with("UINT");
   return CLI::Validator(
-      [of_number](const std::string& word) -> std::string {
+      [of_number, of_whole_number](std::string& word) -> std::string {
         if (word.empty()) return "the value is empty; give one, or leave the option out";
         if (of_number && !widestereo::number_of(word)) {
           return word + " is no finite number";
         }
-        return "";
+        return of_whole_number ? make_decimal(word) : "";
       },
       "");
 }
@@ -40,7 +54,7 @@ void check_words_of(CLI::App& app) {
   for (CLI::Option* option : app.get_options()) {
     const bool is_flag = option->get_expected_max() == 0;
     // The first check of all, as others take NaN to be within their range.
-    if (!is_flag) option->transform(word_check(option->get_type_name().starts_with("FLOAT")));
+    if (!is_flag) option->transform(word_check(option->get_type_name()));
   }
   for (CLI::App* command : app.get_subcommands(nullptr)) check_words_of(*command);
 }

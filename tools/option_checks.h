@@ -9,5 +9,5 @@ CLI::Validator positive_number();
 CLI::Validator non_negative_number();
 
 /// Makes every option, of subcommands too, refuse an empty word, and where it takes numbers NaN and
-/// infinity.
+/// infinity, and read whole numbers by their decimal digits.
 void check_words_of(CLI::App& app);

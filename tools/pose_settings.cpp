@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "pose_settings.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <numeric>
+#include <utility>
 
 #include "option_checks.h"
 #include "widestereo/error.h"
@@ -47,8 +49,20 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
     }
     trajectory.poses = ws::poses_of_camera(std::move(trajectory.poses), *rig.world_from_imu);
   }
-  read.poses = ws::poses_of_frames(frames, chosen, trajectory.poses, tolerance, file);
+  read.poses = ws::poses_of_frames(frames, chosen, std::move(trajectory.poses), tolerance, file);
   return read;
+}
+
+Eigen::Vector3d move_near_origin(std::vector<ws::View>& views) {
+  if (views.empty()) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d origin = ws::local_origin(views.front());
+  if (origin.isZero()) return origin;
+  for (ws::View& view : views) view.world_from_camera.translation() -= origin;
+  std::fprintf(stderr,
+               "widestereo: poses and clouds are relative to (%.0f, %.0f, %.0f), as the model lies "
+               "far from its origin.\n",
+               origin.x(), origin.y(), origin.z());
+  return origin;
 }
 
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses) {
@@ -56,7 +70,7 @@ void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses)
   poses.add_to(
       command,
       "of images taken one after the other, all by camera 0 unless --views names others; by time, "
-      "or one for each in their order",
+      "or one for each in their order, sorted by time",
       "Moving cameras");
 }
 

@@ -34,6 +34,10 @@ struct PoseSettings {
                 const std::vector<std::size_t>& chosen) const;
 };
 
+/// Moves the views of a model that lies far from its origin, as in a national grid, to where single
+/// precision does for their points, and says so. Returns what their positions are relative to then.
+Eigen::Vector3d move_near_origin(std::vector<widestereo::View>& views);
+
 /// Adds the options that calibrated_images() takes.
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses);
 

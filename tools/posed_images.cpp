@@ -93,6 +93,7 @@ PosedImages PosedImageSettings::of_model() const {
     posed.calibrated.push_back(one.views.front());
     all.push_back(i);
   }
+  posed.origin = move_near_origin(posed.calibrated);
   if (model->has_points()) posed.selection = {model, &model->selection()};
   posed.distances = [model, all](const Images& some) {
     const auto distances = model->distances(some);

@@ -33,7 +33,7 @@ struct PosedImages {
   std::function<std::optional<widestereo::DistanceRange>(const Images&)> distances;
   bool in_metres = true;
   bool are_of_one_frame = false;  ///< of a rig
-  /// Of the frame of the views, in that of the trajectory, metres: coordinates stay small.
+  /// Of the frame of the views, in that of the trajectory or model: coordinates stay small.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 
   /// As it is matched. Throws Error unless the file has the calibrated size.

@@ -158,7 +158,7 @@ class Reconstruction {
     Json kept = Json::array();
     for (const Json& result : folders_.results()) {
       const auto image = wanted.find(result["name"].get<std::string>());
-      if (image == wanted.end() || result["group"] != image->second.second) continue;
+      if (image == wanted.end() || result.value("group", Json()) != image->second.second) continue;
       if (!folders_.is_there(result)) continue;
       kept.push_back(result);
       matched_[image->second.first] = true;
@@ -209,6 +209,7 @@ class Reconstruction {
     folders_.add(images_.views[image].name, [&](const fs::path& folder) {
       FolderContents contents{
           .rig = rig, .images = images, .run = run, .in_metres = images_.in_metres};
+      contents.world_origin = images_.origin;
       contents.origin = folders_.origin();
       for (const std::size_t member : group) {
         contents.origin["images"].push_back(images_.files[member].string());
@@ -261,14 +262,13 @@ class Reconstruction {
         folders_.folder() / "cloud_preview.png",
         ws::cloud_picture(cloud, viewpoint_behind(images_.views[middle].world_from_camera, range),
                           preview_size));
-    folders_.note("cloud",
-                  {{"file", "cloud.ply"},
-                   {"points", cloud.size()},
-                   {"images", views.size()},
-                   {"origin", {images_.origin.x(), images_.origin.y(), images_.origin.z()}},
-                   {"min_views", arguments_.fusion.min_views},
-                   {"max_relative", arguments_.fusion.max_relative},
-                   {"max_pixels", arguments_.fusion.max_pixels}});
+    folders_.note("cloud", {{"file", "cloud.ply"},
+                            {"points", cloud.size()},
+                            {"images", views.size()},
+                            {"origin", to_json(images_.origin)},
+                            {"min_views", arguments_.fusion.min_views},
+                            {"max_relative", arguments_.fusion.max_relative},
+                            {"max_pixels", arguments_.fusion.max_pixels}});
   }
 
   const ReconstructArguments& arguments_;

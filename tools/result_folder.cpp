@@ -35,7 +35,9 @@ double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
 
 constexpr const char* group = "Output";
 /// Removes what an earlier run has written into the folder or, interrupted, begun to; nothing else.
-/// The record goes first: without it the folder is not complete.
+/// The record goes first: without it the folder is not complete. Files named .writing-* are left of
+/// writes that did not end, as FolderLock keeps other runs out; where a file system has no locks,
+/// one may be of a run in progress, whose write then fails.
 void remove_earlier_result(const fs::path& folder) {
   static const std::regex names(
       R"(distance(_accepted)?\d+\.(tiff|pfm|png)|(normals|cost|confidence)\d+\.tiff|)"
@@ -182,6 +184,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
                                  {"milliseconds", time.milliseconds}});
   }
   record["patch_samples"] = run.result.samples;
+  record["origin"] = to_json(contents.world_origin);
   record["conventions"] = {
       {"unit", contents.in_metres ? "metre" : "that of the reconstruction"},
       {"distance", "units along the unit viewing ray through the pixel centre; 0 = no value"},
@@ -203,6 +206,9 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"cloud", "world frame, accepted pixels"},
       {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},
+      {"origin",
+       "where a model lies far from its own origin, or reconstruct joins frames: to be added to "
+       "world coordinates for those of the model or trajectory; else 0"},
       {"pixels", "integer coordinates are pixel centres"}};
   return record;
 }
@@ -254,17 +260,28 @@ void FolderFormat::add_extras_to(CLI::App& command, const std::string& clouds) {
   command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
 }
 
-void FolderFormat::require_room_for(double max_distance) const {
+void FolderFormat::require_room_for(double min_distance, double max_distance) const {
   constexpr double largest = std::numeric_limits<std::uint16_t>::max();
   if (std::find(maps.begin(), maps.end(), "png") == maps.end()) return;
-  if (max_distance * png_scale <= largest) return;
+  // What is rounded to 0 reads as no value.
+  const auto is_lost = [min_distance](double scale) {
+    return std::round(min_distance * scale) < 1;
+  };
+  const bool too_far = max_distance * png_scale > largest;
+  if (!too_far && !is_lost(png_scale)) return;
+  const auto text = [](double number) {
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%g", number);
+    return std::string(digits);
+  };
+  const std::string but = " at --png-scale " + text(png_scale) + ", but they ";
   const double scale = std::pow(10.0, std::floor(std::log10(largest / max_distance)));
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "A 16-bit PNG holds distances up to %g at --png-scale %g, but they reach to %g; "
-                "give --png-scale %g, say, or a nearer --max-distance.",
-                largest / png_scale, png_scale, max_distance, scale);
-  throw ws::Error(text);
+  throw ws::Error(
+      "A 16-bit PNG holds distances " +
+      (too_far ? "up to " + text(largest / png_scale) + but + "reach to " + text(max_distance)
+               : "from " + text(0.5 / png_scale) + " on" + but + "begin at " + text(min_distance)) +
+      (is_lost(scale) ? "; leave png out of --formats or give a narrower range."
+                      : "; give --png-scale " + text(scale) + ", say, or a narrower range."));
 }
 
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,

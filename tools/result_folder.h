@@ -28,8 +28,8 @@ struct FolderFormat {
   void add_for_many_frames_to(CLI::App& command);
   /// --clouds and --pictures alone: maps that are read again are TIFFs.
   void add_for_fused_images_to(CLI::App& command);
-  /// Throws Error where a PNG cannot hold distances up to this one.
-  void require_room_for(double max_distance) const;
+  /// Throws Error where a PNG cannot hold all distances of this range.
+  void require_room_for(double min_distance, double max_distance) const;
 
  private:
   void add_maps_to(CLI::App& command);
@@ -53,6 +53,8 @@ struct FolderContents {
   nlohmann::ordered_json origin = {};                 ///< where the images came from
   std::vector<widestereo::GroundTruth> truths = {};   ///< one for each view, or none
   std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none
+  /// Of the rig's frame, in that of the model or trajectory.
+  Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
 };
 
 /// Writes the folder, each file atomically and the record result.json last, so that a folder

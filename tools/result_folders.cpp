@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* unfinished = ".unfinished";
 
-/// The first setting that differs, as "NAME is A there and B now"; empty if none does.
+/// The first setting (of objects) that differs, as "NAME is A there and B now"; empty if none does.
 std::string first_difference(const Json& there, const Json& now) {
   const auto a = nlohmann::json::parse(to_text(there));
   const auto b = nlohmann::json::parse(to_text(now));
@@ -48,7 +48,10 @@ bool is_within_folder(const fs::path& name) {
 }  // namespace
 
 std::string absolute_path(const std::string& path) {
-  return path.empty() ? path : fs::absolute(path).lexically_normal().string();
+  if (path.empty()) return path;
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  // The separator that "folder/" and "." leave at the end.
+  return (whole.has_filename() ? whole : whole.parent_path()).string();
 }
 
 Json absolute_paths(const std::vector<std::string>& paths) {
@@ -84,8 +87,8 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
   record_ = {{"settings", settings}, {kind_.results, Json::array()}};
   if (!fs::exists(path)) return;
   const Json before = Json::parse(std::ifstream(path), nullptr, false);
-  const bool is_record = before.is_object() && before.contains("settings") &&
-                         before.contains(kind_.results) && before[kind_.results].is_array();
+  const bool is_record = before.is_object() && before.value("settings", Json()).is_object() &&
+                         before.value(kind_.results, Json()).is_array();
   if (!is_record ||
       !std::all_of(before[kind_.results].begin(), before[kind_.results].end(),
                    [this](const Json& result) { return is_record_of_result(result); })) {
@@ -124,7 +127,7 @@ void ResultFolders::remove(const std::string& name) const {
   if (!fs::exists(path)) return;
   const Json record = record_in(path);
   const Json whose = record.is_object() ? record.value("input", Json()) : Json();
-  if (!whose.is_object() || whose.value("run", "") != kind_.name) {
+  if (!whose.is_object() || whose.value("run", Json()) != Json(kind_.name)) {
     throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +
                     "; choose another folder, or remove it.");
   }

@@ -24,6 +24,7 @@
 #include "sequence_folder.h"
 #include "sharpness_settings.h"
 #include "size_settings.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/motion.h"
@@ -34,6 +35,10 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 namespace {
+
+/// Of a frame, for others to be started from it or compared with it. Noise alone has up to 12 %
+/// accepted by chance, black frames nothing.
+constexpr double least_accepted = 0.15;
 
 struct SequenceArguments {
   std::string dataset;
@@ -190,6 +195,8 @@ class SequenceRun {
   }
 
   void take_up(std::size_t last) {
+    for (const Json& record : folder_.frames()) note_cold(record);
+    if (!is_of_use(folder_.frames().back())) return;
     const ws::SequenceFrame& frame = selection_.frames[last];
     const std::vector<cv::Mat> images = images_of(frame);
     previous_ = {blurred(images, selection_.blurs), folder_.planes(frame.name, selection_.rig)};
@@ -198,7 +205,6 @@ class SequenceRun {
                    "widestereo: The planes of frame %s are gone; the next one starts from none.\n",
                    frame.name.c_str());
     }
-    for (const Json& record : folder_.frames()) note_cold(record);
   }
 
   /// What a frame's record says of what it comes of.
@@ -210,8 +216,13 @@ class SequenceRun {
     return input;
   }
 
+  /// To the frames after it: a black or blank one would spoil them, or hide a scene cut.
+  static bool is_of_use(const Json& record) {
+    return record["accepted"].get<double>() >= least_accepted;
+  }
+
   void note_cold(const Json& record) {
-    if (record["start"] == "warm") return;
+    if (record["start"] == "warm" || !is_of_use(record)) return;
     cold_ = {record["accepted"].get<double>(), record["mean_cost"].get<double>()};
   }
 
@@ -239,7 +250,8 @@ class SequenceRun {
     }
     require_no_validation_messages(device_);
     write(index, taken, frame);
-    previous_ = {images, std::move(result.views), true};
+    previous_ = {};
+    if (is_of_use(folder_.frames().back())) previous_ = {images, std::move(result.views), true};
     ++matched_;
   }
 
@@ -337,7 +349,8 @@ void summarise(const Json& frames, bool warm) {
 }
 
 void run_sequence(const SequenceArguments& arguments) {
-  arguments.format.require_room_for(arguments.settings.options().max_distance);
+  const ws::Options options = arguments.settings.options();
+  arguments.format.require_room_for(options.min_distance, options.max_distance);
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
   if (arguments.as_json) {
@@ -378,7 +391,10 @@ void add_sequence_command(CLI::App& app) {
   command
       ->add_option("--restart-below", a->restart_below,
                    "Match a frame by itself when less than this share of what the last such frame "
-                   "had is accepted; 0 = never")
+                   "had is accepted; 0 = never. Frames with less than " +
+                       ws::text_of(least_accepted) +
+                       " of their pixels accepted (black, blank) do not count; the next one is "
+                       "matched by itself, too")
       ->check(CLI::Range(0.0, 1.0))
       ->excludes(no_warm_start)
       ->capture_default_str()

@@ -83,9 +83,11 @@ Camera whole_sphere(int width, int height);
 /// `name` (for example "camchain.yaml: cam0") begins the message.
 void validate(const Camera& camera, const std::string& name);
 
-/// Projects a point or direction (any positive scale) in the camera frame to a pixel.
-/// Returns false when it lies outside the model's exact domain or the field of view; pixels outside
-/// the image are returned as true: the caller decides. `pixel` is unspecified when false.
+/// Projects a point or direction (any positive scale) in the camera frame to a pixel. The camera
+/// must be valid here, in unproject(), PreparedCamera and model_max_theta(), which do not check it:
+/// where validate() throws, their results are unspecified. Returns false when the point lies
+/// outside the model's exact domain or the field of view; pixels outside the image are returned as
+/// true: the caller decides. `pixel` is unspecified when false.
 bool project(const Camera& camera, const Eigen::Vector3d& point, Eigen::Vector2d& pixel);
 
 /// As project(), with the derivative of the pixel by the point (pixels per metre).
@@ -119,12 +121,13 @@ class PreparedCamera {
 double model_max_theta(const Camera& camera);
 
 /// The camera after resizing its image to width x height (both axes scale about the image corner:
-/// cx' = s (cx + 0.5) - 0.5).
+/// cx' = s (cx + 0.5) - 0.5). Throws Error where either size has no pixel; validates nothing else.
 Camera resized(const Camera& camera, int width, int height);
 
 /// Unit rays of all pixels, CV_32FC4: (x, y, z, 1), or (x, y, z, 0) where the model has a ray but
 /// the field of view or the mask excludes the pixel, or zeros where there is no ray. `mask`: empty,
-/// or CV_8UC1 of the camera's size, 0 = excluded.
+/// or CV_8UC1 of the camera's size, 0 = excluded. Throws Error for other masks and for cameras that
+/// validate() refuses.
 cv::Mat ray_image(const Camera& camera, const cv::Mat& mask);
 
 }  // namespace widestereo

@@ -44,7 +44,11 @@ struct DeviceRequest {
 /// other.
 class Device {
  public:
+  /// Throws Error where no device has that name or the one that has cannot be used as asked for,
+  /// naming the cause and the remedy. "auto" passes such devices over (note()), "cpu" is always
+  /// there; neither throws.
   static Device open(const DeviceRequest& request);
+  /// The same with the other requests at their defaults.
   static Device open(const std::string& device);
   /// All devices of this machine, best first, the CPU last. Never throws for a missing driver.
   static std::vector<DeviceInfo> list();

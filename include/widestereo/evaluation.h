@@ -28,7 +28,8 @@ constexpr int texture_patch_side = 9;          ///< pixels
 constexpr double texture_least_deviation = 4;  ///< grey levels
 
 /// 255 where the image (CV_8UC1, grey levels) is textured, else 0; `field_of_view`: CV_8UC1, 0 =
-/// outside.
+/// outside. This and all functions below that take maps throw Error for other types than these,
+/// empty maps that are needed and different sizes.
 cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& field_of_view);
 
 /// An edge of the true scene runs between horizontal or vertical neighbours, both inside the
@@ -50,11 +51,12 @@ struct RegionScores {
   std::map<double, double>
       bad_relative;  ///< threshold (0.005 = 0.5 %) -> share with larger relative error
   std::map<double, double>
-      bad_pixels;  ///< threshold (px) -> share with larger displacement in the source
-  /// The same over the pixels that have a prediction (and, for pixels, one that projects into the
-  /// source).
+      bad_pixels;  ///< threshold (px) -> share with larger displacement in the source, of the
+                   ///< pixels whose true point projects into the source image
+  /// The same over those of them that have a prediction (and, for displacements, one that projects
+  /// into the source).
   std::map<double, double> bad_relative_predicted, bad_pixels_predicted;
-  double median_pixels = 0;         ///< px, predicted pixels
+  double median_pixels = 0;         ///< px, the pixels of bad_pixels_predicted
   double mean_absolute = 0;         ///< metres, predicted pixels
   double root_mean_square = 0;      ///< metres, predicted pixels
   double median_absolute = 0;       ///< metres, predicted pixels
@@ -65,9 +67,9 @@ struct RegionScores {
 
 /// Scores `distance` (CV_32FC1, metres along the ray; <= 0 or non-finite = no prediction) of view
 /// `reference` against ground truth. Displacements are those of the predicted point's projection in
-/// view `source` from the true one's; a point that does not project there counts as bad. `normals`
-/// (may be empty) as in GroundTruth. Field-angle bands and the textured regions are taken over the
-/// non-occluded pixels.
+/// view `source` from the true one's: a predicted point that does not project there counts as bad,
+/// a pixel whose true point lies outside the source image has none. `normals` (may be empty) as in
+/// GroundTruth. Field-angle bands and the textured regions are taken over the non-occluded pixels.
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source);
@@ -115,7 +117,8 @@ struct SparsificationPoint {
   double bad_pixels = 0;  ///< share of them displaced by more than 2 px
 };
 
-/// Ten points, from the most confident tenth to all non-occluded pixels. `confidence`: CV_32FC1.
+/// Ten points, from the most confident tenth to all non-occluded pixels whose true point projects
+/// into the source image. `confidence`: CV_32FC1.
 std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const cv::Mat& confidence,
                                                 const GroundTruth& truth, const View& reference,
                                                 const View& source);

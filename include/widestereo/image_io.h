@@ -16,14 +16,15 @@ namespace widestereo {
 void write_file(const std::filesystem::path& path,
                 const std::function<void(std::ostream& stream)>& write);
 
-/// Creates the folder (and parents) if needed and checks that files can be made in it.
+/// Creates the folder (and parents) if needed and checks that files can be made in it. Throws Error
+/// naming the folder where either fails.
 void prepare_output_folder(const std::filesystem::path& folder);
 
 /// Throws Error where a file cannot be written, for those that are written after long work.
 void require_writable(const std::filesystem::path& file);
 
-/// Reads an 8- or 16-bit image, grey or BGR, depth kept. Throws Error (missing, truncated, damaged,
-/// no image).
+/// Reads an 8- or 16-bit image, grey, BGR or BGRA, depth kept. Throws Error (missing, truncated,
+/// damaged, no image, of another type).
 cv::Mat read_image(const std::filesystem::path& path);
 
 /// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA
@@ -33,24 +34,28 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name);
 
 /// The same as grey levels 0 to 255, CV_8UC1.
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
-/// Of a file.
+/// Of a file, as read_image() reads it.
 cv::Mat read_grey_levels(const std::filesystem::path& path);
 
 /// Reads a mask, CV_8UC1: 255 where the grey image of a file is above 0, 0 = ignore the pixel.
+/// Throws Error as read_image() does.
 cv::Mat read_mask(const std::filesystem::path& path);
 
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm or .png (16 bit, divided
-/// by `png_scale`, which is the PNG units per metre). Throws Error.
+/// by `png_scale`, which is the PNG units per metre). Throws Error (missing, truncated, damaged, no
+/// such map).
 cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);
 
 /// Writes a CV_32FC1 or CV_32FC3 (x y z) map by extension: .tiff (32-bit float), .pfm, or .png (16
-/// bit, CV_32FC1 only: round(value * png_scale), 0 where not positive or not representable).
+/// bit, CV_32FC1 only: round(value * png_scale), 0 where not positive or not representable). Throws
+/// Error for other types and extensions, and as write_file() does.
 void write_map(const std::filesystem::path& path, const cv::Mat& map, double png_scale = 1000.0);
 
-/// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension).
+/// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension). Throws Error where the extension
+/// names no format that holds it, and as write_file() does.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
 
-/// Writes text.
+/// Writes text. Throws Error as write_file() does.
 void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace widestereo

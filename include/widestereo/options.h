@@ -71,8 +71,9 @@ struct Options {
   PatchWarp warp = PatchWarp::exact;
   DistanceSampling sampling = DistanceSampling::uniform;
   Propagation propagation = Propagation::checkerboard;
-  int first_iterations = 60;  ///< of the first view, started from random planes, >= 1
-  int second_iterations = 8;  ///< of every further view, started from the first one's planes, >= 0
+  int first_iterations = 60;  ///< of the first view, started from random planes, 1..100000
+  /// Of every further view, started from the first one's planes, 0..100000.
+  int second_iterations = 8;
   int refinements =
       4;  ///< random perturbations per pixel and iteration, 0..16; range halved each time
   /// Cost = mean over this many of the source views that see the patch, best first, or over all of
@@ -80,23 +81,25 @@ struct Options {
   int best_sources = 1;
   PatchPattern pattern = PatchPattern::dense;
   /// Weight (1 + |difference| / (8 scale))^-8, about exp(-|difference| / scale), of a sample whose
-  /// intensity differs from the centre's, grey levels of 255; 0 = all weigh the same.
+  /// intensity differs from the centre's, grey levels (of 255), 0..10000; 0 = all weigh the same.
   double weight_scale = 0;
   Interpolation interpolation = Interpolation::linear;
   Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid.
-  int levels = 3;                                 ///< each half the size of the finer one, 1..4
-  int sweep_steps = 64;                           ///< inverse distances tried at the coarsest level
-  std::vector<int> level_iterations = {3, 2, 1};  ///< coarsest level first, one for each level
+  int levels = 3;        ///< each half the size of the finer one, 1..4
+  int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
+  /// Coarsest level first, one for each level, 0..1000.
+  std::vector<int> level_iterations = {3, 2, 1};
   std::vector<int> level_regressions = {1, 1, 3};  ///< rounds of plane regression, likewise
-  int regression_radius = 40;    ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
-                                 ///< normals alone four times that
-  int regression_steps = 4;      ///< of the grid of neighbours that count, in its radius, 1..16
-  double regression_scale = 12;  ///< intensity scale of the regression's weights, grey levels
+  int regression_radius = 40;  ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
+                               ///< normals alone four times that
+  int regression_steps = 4;    ///< of the grid of neighbours that count, in its radius, 1..16
+  /// Intensity scale of the regression's weights, grey levels, 0.1..10000.
+  double regression_scale = 12;
   /// A neighbourhood of an eighth, a quarter or half the radius is taken where it determines the
   /// plane to this standard deviation (source pixels, nominal: neighbours count as independent);
-  /// > 0. Each further round of a level asks for 0.6 of the one before.
+  /// 1e-6..1000. Each further round of a level asks for 0.6 of the one before.
   double regression_precision = 0.021;
   /// The first regression of a level averages what neighbours' patches match best, to sub-pixel
   /// accuracy by least squares, instead of where the search has left them.
@@ -111,28 +114,29 @@ struct Options {
   /// How much better (cost) the nearest planes must match than the farthest, so that surfaces
   /// without texture and sky come out as far, 0..2.
   double far_preference = 0;
-  double step_pixels = 1;     ///< first perturbation, source pixels; halved each iteration
-  double step_normal = 0.5;   ///< first perturbation of a unit normal, at the coarsest level only;
-                              ///< halved each iteration
+  double step_pixels = 1;     ///< first perturbation, source pixels, 0..1000; halved each iteration
+  double step_normal = 0.5;   ///< first perturbation of a unit normal, at the coarsest level only,
+                              ///< 0..2; halved each iteration
   bool source_planes = true;  ///< try the planes that the source views hold
 
   /// Of a frame that starts from the previous one's planes (Matcher::match_next()).
-  int warm_iterations = 8;  ///< of every view, all at full size, >= 0
-  /// SearchMethod::pyramid: rounds of plane regression, >= 0. Fewer than a cold frame's, because
+  int warm_iterations = 8;  ///< of every view, all at full size, 0..100000
+  /// SearchMethod::pyramid: rounds of plane regression, 0..1000. Fewer than a cold frame's, because
   /// frames average, too, and neighbourhoods that overlap from frame to frame would spread across
   /// edges.
   int warm_regressions = 1;
 
-  double min_texture = 0.5;  ///< grey levels (of 255): patches with a smaller standard deviation
+  double min_texture = 0.5;  ///< grey levels (0..255): patches with a smaller standard deviation
                              ///< carry no information
   double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0..1
 
-  double consistency_relative =
-      0.02;                         ///< left-right check: largest relative difference of distance
-  double consistency_pixels = 1.0;  ///< left-right check: largest displacement in pixels
+  /// Left-right check: largest relative difference of distance, 0..1000.
+  double consistency_relative = 0.02;
+  double consistency_pixels = 1.0;  ///< left-right check: largest displacement, pixels, 0..1000
   double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2
-  double min_parallax = 0.5;  ///< pixels between min_distance and max_distance in the source view
-  double max_tilt = 85;       ///< degrees between the normal and the viewing ray, 0..90
+  /// Pixels between min_distance and max_distance in the source view, 0..10000.
+  double min_parallax = 0.5;
+  double max_tilt = 85;  ///< degrees between the normal and the viewing ray, 0..90
   /// Smallest share of the planes around (40 pixels wide) that put the pixel's point within a
   /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;

@@ -15,18 +15,21 @@ struct ColourRange {
   double farthest = 0;
 };
 
-/// The 2nd and 98th percentile of the inverse distances of a map, as distances.
+/// The 2nd and 98th percentile of the inverse distances of a map (CV_32FC1, metres), as distances.
+/// This and all pictures of maps throw Error for other types than these, empty maps and different
+/// sizes.
 ColourRange robust_range(const cv::Mat& distance);
 
 /// All pictures are CV_8UC3 BGR of the map's size; pixels without a value are dark grey.
-/// Inverse distance in colours: near red, far blue.
+/// Inverse distance (CV_32FC1, metres) in colours: near red, far blue.
 cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range);
-/// Normals (x right, y down, z forward, facing the camera) as red = (1 + x) / 2, green = (1 - y) /
-/// 2, blue = (1 - z) / 2: a wall that faces the camera is bluish, a floor green.
+/// Normals (CV_32FC3: x right, y down, z forward, facing the camera) as red = (1 + x) / 2, green =
+/// (1 - y) / 2, blue = (1 - z) / 2: a wall that faces the camera is bluish, a floor green.
 cv::Mat normal_picture(const cv::Mat& normals);
-/// A map between two values from dark to bright.
+/// A map (CV_32FC1) between two values from dark to bright.
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high);
-/// Reason bits: the colour of the first bit set, the grey image where accepted.
+/// Reason bits (CV_16UC1): the colour of the first bit set, the image (8 or 16 bit, grey, BGR or
+/// BGRA) where accepted.
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
 
 /// A cloud in its own colours as a pinhole camera of 90 degrees across sees it from
@@ -34,8 +37,8 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
 cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
                       cv::Size size);
 
-/// A picture with a legend below, 64 pixels wide or more: the colour bar of distance_picture() with
-/// distances in `unit`.
+/// A picture (CV_8UC3) with a legend below, 64 pixels wide or more: the colour bar of
+/// distance_picture() with distances in `unit`.
 cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range,
                              const std::string& unit = " m");
 /// ... the colour bar of scalar_picture() with its end values.
@@ -45,10 +48,11 @@ cv::Mat with_reason_legend(const cv::Mat& picture);
 
 struct Panel {
   std::string title;
-  cv::Mat picture;  ///< 8 or 16 bit, grey or colour
+  cv::Mat picture;  ///< 8 or 16 bit, grey, BGR or BGRA
 };
 /// Panels side by side, `columns` in a row, each scaled to the width of the first (64 pixels or
-/// more) and titled. Throws Error where there are none or no columns.
+/// more) and titled. Throws Error where there are none or no columns, and for pictures of other
+/// types.
 cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns);
 
 }  // namespace widestereo

@@ -37,6 +37,12 @@ inline double baseline(const View& a, const View& b) {
   return (a.world_from_camera.translation() - b.world_from_camera.translation()).norm();
 }
 
+/// Where to put the origin of a frame in which a view and what it sees have small coordinates, as
+/// single precision (CloudPoint) needs them: whole thousands of metres on axes along which the view
+/// lies 10 km or more from the world's origin, as in national grids, else 0. To be subtracted from
+/// the positions of all views that are used together.
+Eigen::Vector3d local_origin(const View& view);
+
 /// Whether two camera centres (world frame) are far enough apart to tell distances at all.
 inline bool has_baseline(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   constexpr double least = 1e-9;  // metres

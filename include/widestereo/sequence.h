@@ -47,7 +47,7 @@ struct StampedPose {
 };
 
 struct Trajectory {
-  std::vector<StampedPose> poses;  ///< in the order of time
+  std::vector<StampedPose> poses;  ///< in the file's order
   Body body = Body::camera;        ///< what files of this layout hold
 };
 
@@ -63,11 +63,12 @@ std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
                                          const Eigen::Isometry3d& camera_from_imu);
 
 /// The poses of the chosen ones among all frames (by index): the one nearest in time, within
-/// `tolerance` seconds, where frames have times; else in their order, where there are as many.
+/// `tolerance` seconds, where frames have times; else in their order, where there are as many and
+/// their times do not go back.
 /// Throws Error otherwise; `name` (of the file) begins the message.
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
                                                const std::vector<std::size_t>& chosen,
-                                               const std::vector<StampedPose>& trajectory,
+                                               std::vector<StampedPose> trajectory,
                                                double tolerance, const std::string& name);
 
 }  // namespace widestereo

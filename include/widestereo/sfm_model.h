@@ -49,14 +49,16 @@ class SfmModel {
   /// Calibration and poses of images, validated; views are named as the images are. The world frame
   /// and the unit of length are the reconstruction's: metres only where it was scaled to them.
   /// Pixel centres, at half pixels there, are moved to whole ones. Views have the masks that a
-  /// transforms.json names. Throws Error, also for division models of pincushion distortion.
+  /// transforms.json names. Throws Error, also for numbers of no image and for division models of
+  /// pincushion distortion.
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const;
 
-  /// The same of the images of files.
+  /// The same of the images of files. Throws Error as image_of() does, too.
   CalibratedImages calibrated_files(const std::vector<std::filesystem::path>& files) const;
 
   /// From 0.75 of the 1st to 1.25 of the 99th percentile of the distances between the images and
-  /// the points that they observe; nothing where that is fewer than 20.
+  /// the points that they observe; nothing where that is fewer than 20. Throws Error for numbers of
+  /// no image.
   std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const;
 
   /// Whether it has points that images observe; without any the selection is empty.
@@ -66,7 +68,7 @@ class SfmModel {
   const ViewSelection& selection() const;
 
   /// ViewSelection::sources() of the image of a file, as files of the folder of images that it lies
-  /// in by its name.
+  /// in by its name. Throws Error as image_of() does.
   std::vector<std::filesystem::path> source_files(const std::filesystem::path& file,
                                                   std::size_t count) const;
 

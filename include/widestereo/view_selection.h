@@ -18,7 +18,8 @@ struct ObservedPoint {
 
 /// Points that stand for a scene of which nothing is known but how far it reaches: on a grid of
 /// rays of each view, at distances (metres) from `nearest` to `farthest` that grow by equal
-/// factors, with all views that they project into. What hides them is not known.
+/// factors, with all views that they project into. What hides them is not known. Cameras
+/// must be valid (validate()) and 0 < nearest <= farthest, which is not checked.
 std::vector<ObservedPoint> assumed_points(const std::vector<View>& views, double nearest,
                                           double farthest);
 
@@ -27,13 +28,15 @@ std::vector<ObservedPoint> assumed_points(const std::vector<View>& views, double
 /// ECCV 2018, section 4.1). Views that share a centre are never matched.
 class ViewSelection {
  public:
-  /// `centres`: of each view's camera, world frame.
+  /// `centres`: of each view's camera, world frame. Views are numbered as they are, from 0; throws
+  /// Error where an observer has no such number.
   ViewSelection(std::vector<Eigen::Vector3d> centres, std::vector<ObservedPoint> points);
   ~ViewSelection();
   ViewSelection(ViewSelection&&) noexcept;
   ViewSelection& operator=(ViewSelection&&) noexcept;
 
-  /// At most `count` others, best first; fewer where fewer share points.
+  /// At most `count` others, best first; fewer where fewer share points. Throws Error where there
+  /// is no such view.
   std::vector<std::size_t> sources(std::size_t view, std::size_t count) const;
 
   /// Groups of at most `size` views to match with each other, which together hold every view. From

@@ -15,9 +15,10 @@ struct SynthesisedView {
 };
 
 /// `distance`: CV_32FC1, metres along the rays of `view` (<= 0 or non-finite: none); `other_image`:
-/// CV_8UC1, grey levels. A point is hidden when another one that lands within 2 pixels of it is
-/// nearer to the other camera by more than 5 %. Throws Error for other types and sizes than those
-/// of the calibration.
+/// CV_8UC1, grey levels. A point is hidden when another one that lands in the same cell of 2x2
+/// pixels of the other image (a fixed grid from its corner) is nearer to the other camera by more
+/// than 5 %. Throws Error for other types and sizes than those of the calibration, and where both
+/// views have one centre.
 SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
                                 const cv::Mat& other_image, const View& other);
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "calibration/formats.h"
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -206,6 +207,7 @@ Rig read_basalt(const Document& document) {
 
 void write_basalt(const std::filesystem::path& path, const Rig& rig) {
   using calibration::Json;
+  require_cameras(rig, "Cannot write " + path.string() + ": the rig");
   Json value;
   value["T_imu_cam"] = Json::array();
   value["intrinsics"] = Json::array();

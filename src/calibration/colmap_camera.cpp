@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "calibration/colmap_camera.h"
 
-#include <algorithm>
+#include <optional>
 
 #include "calibration/formats.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 
 namespace widestereo::calibration {
@@ -76,9 +77,15 @@ Camera camera_of(const ColmapCamera& record, const std::string& name) {
   const double* next = record.parameters.data();
   Camera camera;
   camera.model = model.equivalent;
-  constexpr double beyond_any_image = 1e6;  // which validate() refuses
-  camera.width = static_cast<int>(std::min(record.width, beyond_any_image));
-  camera.height = static_cast<int>(std::min(record.height, beyond_any_image));
+  const std::optional<int> width = whole_number(record.width);
+  const std::optional<int> height = whole_number(record.height);
+  if (!width || !height) {
+    throw Error(name + ": A camera's size is " + text_of(record.width) + "x" +
+                text_of(record.height) +
+                "; give its width and height as whole numbers of pixels, at most a million.");
+  }
+  camera.width = *width;
+  camera.height = *height;
   if (camera.model == CameraModel::equirectangular) {
     // Its parameters repeat the size.
     return whole_sphere(camera.width, camera.height);

@@ -4,7 +4,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -21,7 +20,6 @@ namespace {
 constexpr double ratio = 0.8;
 constexpr std::size_t fewest_matches = 8;
 constexpr double at_epipole = 1e-6;  // radians
-constexpr double degrees = 180 / std::numbers::pi;
 
 struct Features {
   std::vector<cv::KeyPoint> points;
@@ -105,7 +103,7 @@ EpipolarReport check_epipolar(const View& first, const View& second,
     Eigen::Vector2d foot;
     if (!rays.second_camera().project(ray_second - offset * plane, foot)) continue;
     pixels.push_back((foot - match.second).norm());
-    angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees);
+    angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees_per_radian);
     const double parallax = degrees_between(rotated, ray_second);
     if (parallax < 0.3) continue;
     const Eigen::Vector3d other = motion.linear().transpose() * ray_second;

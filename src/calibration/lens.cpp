@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "geometry/angle.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -14,13 +15,12 @@
 namespace widestereo {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
-constexpr double ring_width = 0.5 * degree;
+constexpr double ring_width = 0.5 * radians_per_degree;
 constexpr std::size_t fewest_pixels = 50;                    // of a ring
 constexpr std::size_t fewest_dark_rings = 3;                 // fewer may be noise
 constexpr std::size_t plateau_begin = 40, plateau_end = 10;  // rings inside of the dark
 constexpr float noise = 4.0F / 255;                          // of black pixels
-constexpr double smallest_rim = 60 * degree;
+constexpr double smallest_rim = 60 * radians_per_degree;
 /// Reflections inside lenses reach no farther in.
 constexpr double widest_reflections = 0.08;  // of the angle
 

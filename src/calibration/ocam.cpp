@@ -10,12 +10,11 @@
 #include <utility>
 
 #include "calibration/yaml_camera.h"
+#include "geometry/angle.h"
 #include "text/number.h"
 
 namespace widestereo::calibration {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 double value_of(const std::vector<double>& polynomial, double r) {
   double value = 0;
@@ -149,7 +148,7 @@ Camera camera_of(const OCamLens& lens, int width, int height, const Document& do
   camera.height = height;
   camera.cx = lens.centre.x();
   camera.cy = lens.centre.y();
-  constexpr double narrowest = 20 * degree;
+  constexpr double narrowest = 20 * radians_per_degree;
   const double corner = corner_radius(lens, width, height);
   double end = usable_radius(lens, corner);
   while (angle_of(lens, end) > narrowest) {
@@ -212,7 +211,7 @@ Rig read_omnimvs(const Document& document) {
         document.fail(view.name + ": The key poly does not list as many numbers as it says.");
       }
       OCamLens lens = lens_of(*polynomial, keys.numbers("center", 2), keys.numbers("affine", 3));
-      if (keys.has("max_fov")) lens.max_theta = 0.5 * keys.number("max_fov") * degree;
+      if (keys.has("max_fov")) lens.max_theta = 0.5 * keys.number("max_fov") * radians_per_degree;
       const std::vector<int> size = keys.sides("image_size");
       view.camera = camera_of(lens, size[1], size[0], document, view.name);
       const std::vector<double> pose = keys.numbers("pose", 6);

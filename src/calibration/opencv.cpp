@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cctype>
 #include <initializer_list>
 #include <iterator>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/core/persistence.hpp>
+#include <optional>
 #include <span>
+#include <string_view>
 
 #include "calibration/formats.h"
 
@@ -16,11 +19,38 @@ namespace {
 
 using Keys = std::initializer_list<const char*>;
 
+/// How many levels OpenCV's parsers find in a text at most: each begins with a bracket, an element
+/// of XML, a key's colon or an item's dash. Those in comments and strings count, too, as parsers
+/// differ in where these end.
+std::size_t most_levels(std::string_view text) {
+  std::size_t levels = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    const char next = i + 1 < text.size() ? text[i + 1] : '\0';
+    const bool negative = next == '.' || std::isdigit(static_cast<unsigned char>(next)) != 0;
+    levels +=
+        c == '[' || c == '{' || c == ':' || (c == '<' && next != '/') || (c == '-' && !negative);
+  }
+  return levels;
+}
+
+/// The parsers call themselves at each level, until the stack is full.
+const std::string& parsable(const Document& document) {
+  constexpr std::size_t most = 5000;  // 2 MiB of stack at 400 bytes a level
+  if (most_levels(document.text) > most) {
+    document.fail("It has more than " + std::to_string(most) +
+                  " brackets, keys and items, which may be too deep in each other for OpenCV; "
+                  "leave only those of the calibration.");
+  }
+  return document.text;
+}
+
 /// A FileStorage whose keys go by several names.
 class Storage {
  public:
   explicit Storage(const Document& document)
-      : document_(document), file_(document.text, cv::FileStorage::READ | cv::FileStorage::MEMORY) {
+      : document_(document),
+        file_(parsable(document), cv::FileStorage::READ | cv::FileStorage::MEMORY) {
     if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
   }
 
@@ -80,10 +110,12 @@ class Storage {
   }
 
   cv::Size size_of(double width, double height) const {
-    if (!(width >= 1 && height >= 1 && width <= 1e6 && height <= 1e6)) {
+    const std::optional<int> columns = whole_number(width);
+    const std::optional<int> rows = whole_number(height);
+    if (!columns || !rows) {
       document_.fail("The image size is not a pair of whole numbers of pixels.");
     }
-    return {static_cast<int>(width), static_cast<int>(height)};
+    return {*columns, *rows};
   }
 
   const Document& document_;

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <sstream>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -128,52 +125,6 @@ Document load(const std::filesystem::path& path) {
   return {path, text.str()};
 }
 
-/// How deep brackets, or the elements of XML, lie in each other at most.
-int nesting_of(std::string_view text) {
-  const bool xml = text.substr(0, text.find_first_not_of(" \t\r\n\xEF\xBB\xBF") + 1).ends_with('<');
-  int depth = 0;
-  int deepest = 0;
-  std::size_t i = 0;
-  const auto next_is = [&](std::string_view what) { return text.substr(i).starts_with(what); };
-  const auto skip_to = [&](std::size_t end) { i = std::min(end, text.size()); };
-  for (; i < text.size(); ++i) {
-    const char c = text[i];
-    if (xml) {
-      if (next_is("<!--")) {
-        skip_to(text.find("-->", i));
-      } else if (next_is("</") || next_is("/>")) {
-        depth = std::max(depth - 1, 0);
-      } else if (c == '<' && !next_is("<?")) {
-        ++depth;
-      }
-    } else if (c == '#' || next_is("//")) {
-      skip_to(text.find('\n', i));
-    } else if (next_is("/*")) {
-      skip_to(text.find("*/", i));
-    } else if (c == '"' || c == '\'') {
-      std::size_t end = i + 1;
-      while (end < text.size() && text[end] != c && text[end] != '\n') {
-        end += c == '"' && text[end] == '\\' ? 2 : 1;
-      }
-      skip_to(end);
-    } else if (c == '[' || c == '{') {
-      ++depth;
-    } else if (c == ']' || c == '}') {
-      depth = std::max(depth - 1, 0);
-    }
-    deepest = std::max(deepest, depth);
-  }
-  return deepest;
-}
-
-/// The parsers call themselves at each level, until the stack is full.
-void require_shallow(const Document& document) {
-  constexpr int deepest = 100;
-  if (nesting_of(document.text) <= deepest) return;
-  document.fail("Its contents are nested more than " + std::to_string(deepest) +
-                " levels deep, which no calibration is; is it damaged?");
-}
-
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
@@ -199,13 +150,6 @@ CalibrationFormat format_of(const Document& document) {
       "WoodScape, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI.");
 }
 
-/// A file that another one names.
-Document load_camera(const std::filesystem::path& path) {
-  Document document = load(path);
-  require_shallow(document);
-  return document;
-}
-
 }  // namespace
 }  // namespace calibration
 
@@ -216,7 +160,6 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
   std::vector<Document> documents;
   if (sensor_files.empty()) documents.push_back(load(path));
   for (const std::filesystem::path& file : sensor_files) documents.push_back(load(file));
-  for (const Document& document : documents) require_shallow(document);
   result.format = sensor_files.empty() ? format_of(documents[0]) : CalibrationFormat::euroc;
   switch (result.format) {
     case CalibrationFormat::kalibr:
@@ -235,7 +178,7 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       result.rig = read_camodocal(documents[0]);
       break;
     case CalibrationFormat::vins:
-      result.rig = read_vins(documents[0], load_camera);
+      result.rig = read_vins(documents[0], load);
       break;
     case CalibrationFormat::ocam:
       result.rig = read_ocam(documents[0]);
@@ -244,7 +187,7 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       result.rig = read_omnimvs(documents[0]);
       break;
     case CalibrationFormat::multicol:
-      result.rig = read_multicol(documents[0], load_camera);
+      result.rig = read_multicol(documents[0], load);
       break;
     case CalibrationFormat::woodscape:
       result.rig = read_woodscape(documents[0]);

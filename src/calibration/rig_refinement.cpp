@@ -6,23 +6,22 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <string>
 
+#include "geometry/angle.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
 
-constexpr double degrees = 180 / std::numbers::pi;
 constexpr int most_steps = 50;
 constexpr double last_step = 1e-4;       // of the deviations below
 constexpr double smallest_scale = 0.05;  // pixels: features are not located better
 
 /// Standard deviations of a calibration.
-constexpr double rotation_deviation = 0.5 / degrees;
-constexpr double direction_deviation = 2 / degrees;
+constexpr double rotation_deviation = 0.5 / degrees_per_radian;
+constexpr double direction_deviation = 2 / degrees_per_radian;
 constexpr double focal_deviation = 0.002;  // a factor that all cameras share fits as well
 constexpr double centre_deviation = 1;     // pixels
 constexpr double largest_change = 5;       // deviations: what matches of other views would fit
@@ -117,8 +116,8 @@ class Refinement {
         return RefinedValue{unit * changed.segment(first, count).norm(),
                             unit * refined_(at) * std::sqrt(solver.eigenvalues().maxCoeff())};
       };
-      report.push_back({value(turn, 3, degrees), value(shift, 2, degrees), value(focal, 1, 100),
-                        value(centre, 2, 1)});
+      report.push_back({value(turn, 3, degrees_per_radian), value(shift, 2, degrees_per_radian),
+                        value(focal, 1, 100), value(centre, 2, 1)});
     }
     return report;
   }
@@ -286,7 +285,7 @@ void require_credible(const RigRefinement& refined, const std::vector<ViewMatche
     }
   }
   const auto require_small = [](double change, double deviation, const std::string& what) {
-    const double limit = largest_change * deviation * degrees;
+    const double limit = largest_change * deviation * degrees_per_radian;
     if (change <= limit) return;
     char text[128];
     std::snprintf(text, sizeof text, " by %.1f degrees, more than the %.1f that are believed",

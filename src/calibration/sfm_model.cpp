@@ -9,6 +9,7 @@
 
 #include "calibration/colmap_files.h"
 #include "calibration/nerfstudio.h"
+#include "geometry/validation.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -124,7 +125,7 @@ class SfmModel::Implementation {
     CalibratedImages calibrated;
     calibrated.in_metres = false;
     for (const std::size_t number : images) {
-      const ColmapImage& image = images_.at(number);
+      const ColmapImage& image = image_at(number);
       const auto camera = cameras_.find(image.camera);
       if (camera == cameras_.end()) {
         throw Error(cameras_file_.string() + " has no camera " + std::to_string(image.camera) +
@@ -146,7 +147,7 @@ class SfmModel::Implementation {
   std::optional<DistanceRange> distances(const std::vector<std::size_t>& images) const {
     std::vector<double> values;
     for (const std::size_t number : images) {
-      const ColmapImage& image = images_.at(number);
+      const ColmapImage& image = image_at(number);
       for (const std::uint64_t observed : image.points) {
         const auto point = positions_.find(observed);
         if (point == positions_.end()) continue;
@@ -160,6 +161,11 @@ class SfmModel::Implementation {
   }
 
  private:
+  const ColmapImage& image_at(std::size_t number) const {
+    require_number(number, images_.size(), "image", path_.string());
+    return images_[number];
+  }
+
   void read_points() {
     std::vector<Eigen::Vector3d> centres;
     for (const ColmapImage& image : images_) {

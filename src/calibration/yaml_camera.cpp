@@ -2,17 +2,15 @@
 #include "calibration/yaml_camera.h"
 
 #include <algorithm>
-#include <numbers>
 #include <optional>
 #include <set>
 #include <sstream>
 
+#include "geometry/angle.h"
 #include "text/number.h"
 
 namespace widestereo::calibration {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 /// What OpenCV's own YAML, told by its header line, may have that yaml-cpp refuses: that line (in
 /// OpenVINS's files) and keys without a space before their value (in ORB-SLAM's).
@@ -185,7 +183,7 @@ View YamlCamera::view() const {
   set_distortion(view.camera);
   set_resolution(view.camera);
   if (has("max_theta_deg")) {
-    view.camera.max_theta = number(node_["max_theta_deg"], "max_theta_deg") * degree;
+    view.camera.max_theta = number(node_["max_theta_deg"], "max_theta_deg") * radians_per_degree;
   }
   return view;
 }

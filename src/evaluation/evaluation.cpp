@@ -10,8 +10,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "evaluation/ground_truth.h"
 #include "geometry/angle.h"
 #include "geometry/distance.h"
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -37,27 +39,6 @@ struct Sample {
   cv::Point pixel;
 };
 
-std::string text_of(int type) {
-  const int channels = CV_MAT_CN(type);
-  const int depth = CV_MAT_DEPTH(type);
-  const std::string number = depth == CV_32F  ? "32-bit float"
-                             : depth == CV_8U ? "8-bit whole number"
-                                              : "number of another type";
-  return std::to_string(channels) + " " + number + (channels == 1 ? "" : "s");
-}
-
-void require_size(const cv::Mat& map, cv::Size size, int type, const char* what) {
-  if (map.empty()) return;
-  if (map.type() != type) {
-    throw Error(std::string("The ") + what + " has " + text_of(map.type()) +
-                " a pixel instead of " + text_of(type) + "; give another map.");
-  }
-  if (map.size() == size) return;
-  throw Error(std::string("The ") + what + " is " + std::to_string(map.cols) + "x" +
-              std::to_string(map.rows) + ", but the distance map is " + std::to_string(size.width) +
-              "x" + std::to_string(size.height) + "; give maps of the same view.");
-}
-
 double angle_between(const cv::Vec3f& a, const cv::Vec3f& b) {
   const Eigen::Vector3d u(a[0], a[1], a[2]);
   const Eigen::Vector3d v(b[0], b[1], b[2]);
@@ -66,16 +47,8 @@ double angle_between(const cv::Vec3f& a, const cv::Vec3f& b) {
 }
 
 void require_maps(const cv::Mat& distance, const GroundTruth& truth, const View& reference) {
+  require_truth(distance, truth);
   const cv::Size size = distance.size();
-  if (distance.type() != CV_32FC1 || truth.distance.empty() || distance.empty()) {
-    throw Error("Distance maps to compare must have one 32-bit float channel and not be empty.");
-  }
-  require_size(truth.distance, size, CV_32FC1, "ground truth");
-  require_size(truth.valid, size, CV_8UC1, "mask of valid pixels");
-  require_size(truth.occlusion, size, CV_8UC1, "occlusion map");
-  require_size(truth.normals, size, CV_32FC3, "ground truth of normals");
-  require_size(truth.image, size, CV_8UC1, "reference image");
-  require_size(truth.field_of_view, size, CV_8UC1, "mask of the field of view");
   if (reference.camera.width != size.width || reference.camera.height != size.height) {
     throw Error("The distance map is " + std::to_string(size.width) + "x" +
                 std::to_string(size.height) + ", but the calibration of " + reference.name +
@@ -154,8 +127,8 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
                             const View& reference, const View& source) {
   const cv::Size size = distance.size();
   require_maps(distance, truth, reference);
-  require_size(normals, size, CV_32FC3, "normal map");
-  require_size(confidence, size, CV_32FC1, "confidence map");
+  require_optional_map(normals, size, CV_32FC3, "The normal map");
+  require_optional_map(confidence, size, CV_32FC1, "The confidence map");
   const cv::Mat rays = ray_image(reference.camera, {});
   const SourceView source_view(source, reference);
   std::vector<Sample> samples;
@@ -170,12 +143,12 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * 180 / std::numbers::pi;
       sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
       if (!confidence.empty()) sample.confidence = static_cast<double>(confidence.at<float>(y, x));
+      Eigen::Vector2d expected;
+      sample.in_source = source_view.in_image(sample.truth * ray, expected);
       const float d = distance.at<float>(y, x);
       sample.predicted = has_distance(d);
       if (!sample.predicted) continue;
       sample.error = std::abs(static_cast<double>(d) - sample.truth);
-      Eigen::Vector2d expected;
-      sample.in_source = source_view.in_image(sample.truth * ray, expected);
       if (sample.in_source) {
         sample.displacement = source_view.displacement(static_cast<double>(d) * ray, expected);
       }
@@ -222,7 +195,9 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
   std::vector<double> displacement;
   std::vector<double> angle;
   double squares = 0;
+  std::size_t in_source = 0;
   for (const Sample* sample : samples) {
+    if (sample->in_source) ++in_source;
     if (!sample->predicted) continue;
     absolute.push_back(sample->error);
     relative.push_back(sample->error / sample->truth);
@@ -236,7 +211,7 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
     scores.bad_relative_predicted[t] = share_above(relative, t, 0);
   }
   for (const double t : pixel_thresholds) {
-    scores.bad_pixels[t] = share_above(displacement, t, samples.size() - displacement.size());
+    scores.bad_pixels[t] = share_above(displacement, t, in_source - displacement.size());
     scores.bad_pixels_predicted[t] = share_above(displacement, t, 0);
   }
   if (!samples.empty()) {
@@ -259,7 +234,20 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
 
 }  // namespace
 
+void require_truth(const cv::Mat& distance, const GroundTruth& truth) {
+  const cv::Size size = distance.size();
+  require_type(distance, CV_32FC1, "The distance map");
+  require_map(truth.distance, size, CV_32FC1, "The ground truth");
+  require_optional_map(truth.valid, size, CV_8UC1, "The mask of valid pixels");
+  require_optional_map(truth.occlusion, size, CV_8UC1, "The occlusion map");
+  require_optional_map(truth.normals, size, CV_32FC3, "The ground truth of normals");
+  require_optional_map(truth.image, size, CV_8UC1, "The reference image");
+  require_optional_map(truth.field_of_view, size, CV_8UC1, "The mask of the field of view");
+}
+
 cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& field_of_view) {
+  require_type(image, CV_8UC1, "The image");
+  require_map(field_of_view, image.size(), CV_8UC1, "The mask of the field of view");
   cv::Mat value;
   image.convertTo(value, CV_64F);
   cv::Mat weight;
@@ -351,6 +339,9 @@ FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const Vi
 
 ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& cost,
                                      const cv::Mat& textured) {
+  require_type(cost, CV_32FC1, "The cost map");
+  require_map(differences, cost.size(), CV_32FC2, "The map of differences");
+  require_optional_map(textured, cost.size(), CV_8UC1, "The map of textured pixels");
   ConsistencyScores scores;
   for (int y = 0; y < cost.rows; ++y) {
     for (int x = 0; x < cost.cols; ++x) {
@@ -380,7 +371,7 @@ std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const c
                                                 const GroundTruth& truth, const View& reference,
                                                 const View& source) {
   std::vector<Sample> samples = collect(distance, {}, confidence, truth, reference, source);
-  std::erase_if(samples, [](const Sample& s) { return !s.non_occluded; });
+  std::erase_if(samples, [](const Sample& s) { return !s.non_occluded || !s.in_source; });
   std::stable_sort(samples.begin(), samples.end(),
                    [](const Sample& a, const Sample& b) { return a.confidence > b.confidence; });
   std::vector<SparsificationPoint> curve;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "evaluation/ground_truth.h"
 #include "geometry/distance.h"
 #include "widestereo/evaluation.h"
 
@@ -135,6 +136,7 @@ std::string to_json(const std::vector<ReliabilityBin>& bins) {
 }
 
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
+  require_truth(distance, truth);
   cv::Mat picture = cv::Mat::zeros(distance.size(), CV_8UC3);
   for (int y = 0; y < distance.rows; ++y) {
     for (int x = 0; x < distance.cols; ++x) {

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/distance.h"
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -27,12 +28,6 @@ cv::Mat window_mean(const cv::Mat& map) {
   return mean;
 }
 
-void require_type(const cv::Mat& map, int type, const std::string& name) {
-  if (map.type() == type) return;
-  throw Error(name + " is " + cv::typeToString(map.type()) + " instead of " +
-              cv::typeToString(type) + "; convert it.");
-}
-
 }  // namespace
 
 SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
@@ -41,6 +36,8 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
   require_calibrated_size(other_image, other, "The image of " + other.name);
   require_type(distance, CV_32FC1, "The distance map of " + view.name);
   require_type(other_image, CV_8UC1, "The image of " + other.name);
+  // From one centre every distance fits.
+  require_baseline(view, other, "The view synthesis");
   const Eigen::Isometry3d motion = source_from_reference(other, view);
   const cv::Size size = distance.size();
   cv::Mat_<cv::Point2f> places(size, cv::Point2f(-1, -1));

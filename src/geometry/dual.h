@@ -33,7 +33,6 @@ inline Dual operator/(const Dual& a, const Dual& b) {
 }
 inline bool operator<(const Dual& a, const Dual& b) { return a.value < b.value; }
 inline bool operator>(const Dual& a, const Dual& b) { return a.value > b.value; }
-inline bool operator>=(const Dual& a, const Dual& b) { return a.value >= b.value; }
 
 /// The derivative at 0 is taken as 0: it only meets factors that vanish there.
 inline Dual sqrt(const Dual& a) {

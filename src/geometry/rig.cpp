@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/rig.h"
 
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/validation.h"
@@ -18,6 +19,15 @@ View resized(const View& view, int width, int height) {
   cv::resize(view.mask != 0, kept, size, 0, 0, cv::INTER_AREA);
   result.mask = kept == 255;
   return result;
+}
+
+Eigen::Vector3d local_origin(const View& view) {
+  constexpr double far = 1e4;  // metres, where neighbours in single precision are 1 mm apart
+  // So coarse that it stays, and with it what was matched, when another image comes first.
+  constexpr double step = 1e3;
+  return view.world_from_camera.translation().unaryExpr([](double coordinate) {
+    return std::abs(coordinate) < far ? 0 : step * std::round(coordinate / step);
+  });
 }
 
 bool is_masked(const View& view, const Eigen::Vector2d& position) {

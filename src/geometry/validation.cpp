@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <numbers>
+#include <opencv2/core.hpp>
 #include <sstream>
 
 #include "widestereo/error.h"
@@ -96,10 +97,44 @@ void validate(const Camera& c, const std::string& name) {
   }
 }
 
+void require_number(std::size_t number, std::size_t count, const std::string& name,
+                    const std::string& of) {
+  if (number < count) return;
+  throw Error(of + " has no " + name + " number " + std::to_string(number) + " among its " +
+              std::to_string(count) + "; they are numbered from 0.");
+}
+
+void require_cameras(const Rig& rig, const std::string& name) {
+  if (rig.views.empty()) throw Error(name + " has no cameras; give at least one.");
+}
+
 void require_baseline(const View& a, const View& b, const std::string& name) {
   if (has_baseline(a.world_from_camera.translation(), b.world_from_camera.translation())) return;
   throw Error(name + ": " + a.name + " and " + b.name +
               " have the same centre; stereo needs a baseline.");
+}
+
+void require_type(const cv::Mat& map, int type, const std::string& name) {
+  if (map.empty()) throw Error(name + " is empty; give one that has pixels.");
+  if (map.type() == type) return;
+  throw Error(name + " is " + cv::typeToString(map.type()) + " instead of " +
+              cv::typeToString(type) + "; convert it or give another one.");
+}
+
+void require_size(const cv::Mat& map, cv::Size size, const std::string& name) {
+  if (map.size() == size) return;
+  throw Error(name + " is " + std::to_string(map.cols) + "x" + std::to_string(map.rows) +
+              " pixels instead of " + std::to_string(size.width) + "x" +
+              std::to_string(size.height) + "; use maps of one view.");
+}
+
+void require_map(const cv::Mat& map, cv::Size size, int type, const std::string& name) {
+  require_type(map, type, name);
+  require_size(map, size, name);
+}
+
+void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std::string& name) {
+  if (!map.empty()) require_map(map, size, type, name);
 }
 
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name) {
@@ -112,7 +147,7 @@ void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::
 }
 
 void validate(const Rig& rig, const std::string& name) {
-  if (rig.views.empty()) throw Error(name + " has no cameras.");
+  require_cameras(rig, name);
   for (const View& view : rig.views) {
     const std::string of_view = name + ": " + view.name;
     validate(view.camera, of_view);

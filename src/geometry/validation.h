@@ -12,8 +12,25 @@ namespace widestereo {
 /// Whether a matrix is a rotation, but for entries rounded to four digits.
 bool is_rotation(const Eigen::Matrix3d& matrix);
 
+/// Throws Error unless `number` is that of one of `count` things called `name` ("view"), numbered
+/// from 0. `of`, what has them, begins the message.
+void require_number(std::size_t number, std::size_t count, const std::string& name,
+                    const std::string& of);
+
+/// Throws Error where a rig has no views. `name` begins the message.
+void require_cameras(const Rig& rig, const std::string& name);
+
 /// Throws Error where two views share a centre. `name` begins the message.
 void require_baseline(const View& a, const View& b, const std::string& name);
+
+/// Throws Error unless a map has pixels, of a type such as CV_32FC1. `name` begins the message.
+void require_type(const cv::Mat& map, int type, const std::string& name);
+/// Throws Error unless a map has the size of the others of its view. `name` begins the message.
+void require_size(const cv::Mat& map, cv::Size size, const std::string& name);
+/// Both.
+void require_map(const cv::Mat& map, cv::Size size, int type, const std::string& name);
+/// Both, of a map that may be empty.
+void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std::string& name);
 
 /// Throws Error unless `mask` is empty or CV_8UC1 of the camera's size. `name` begins the message.
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name);

@@ -3,7 +3,19 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "widestereo/error.h"
+
 namespace widestereo {
+
+void require_image(const cv::Mat& image, const std::string& name) {
+  if (image.empty()) throw Error(name + " is empty; give one that has pixels.");
+  const int depth = image.depth(), channels = image.channels();
+  if ((depth == CV_8U || depth == CV_16U) && (channels == 1 || channels == 3 || channels == 4)) {
+    return;
+  }
+  throw Error(name + " is " + cv::typeToString(image.type()) +
+              "; give 8 or 16 bit, grey, BGR or BGRA.");
+}
 
 cv::Mat to_bgr8(const cv::Mat& image) {
   if (image.empty()) return {};

@@ -2,10 +2,15 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <string>
 
 namespace widestereo {
 
-/// An 8- or 16-bit image, grey, BGR or BGRA, as CV_8UC3; empty if it is empty.
+/// Throws Error unless an image has pixels, of 8 or 16 bit, grey, BGR or BGRA. `name` begins the
+/// message.
+void require_image(const cv::Mat& image, const std::string& name);
+
+/// Such an image as CV_8UC3; empty if it is empty.
 cv::Mat to_bgr8(const cv::Mat& image);
 
 }  // namespace widestereo

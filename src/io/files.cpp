@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -14,24 +15,46 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A name that no other write of this machine uses; short, as the target's may be as long as names
-/// can be.
-fs::path temporary_in(const fs::path& folder) {
-  static std::atomic<unsigned> counter{0};
-  return folder / (".writing-" + std::to_string(getpid()) + "-" + std::to_string(counter++));
-}
-
 fs::path folder_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
-/// Removes a file when leaving scope, whether it exists or not.
-struct RemoveOnExit {
-  fs::path path;
-  ~RemoveOnExit() {
-    std::error_code ignored;
-    fs::remove(path, ignored);
+/// A new file, empty, that is removed when leaving scope unless it was renamed.
+class TemporaryFile {
+ public:
+  /// Made exclusively, as containers that share a folder may have the same process IDs; by a short
+  /// name, as the target's may be as long as names can be.
+  explicit TemporaryFile(const fs::path& folder) {
+    static std::atomic<unsigned> counter{0};
+    constexpr mode_t all_may_write = 0666;  // less the umask, as a stream makes files
+    do {
+      path_ = folder / (".writing-" + std::to_string(getpid()) + "-" + std::to_string(counter++));
+      const int file = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, all_may_write);
+      error_ = file < 0 ? errno : 0;
+      if (file >= 0) close(file);
+    } while (error_ == EEXIST);
+    is_mine_ = error_ == 0;
   }
+  ~TemporaryFile() {
+    std::error_code ignored;
+    if (is_mine_) fs::remove(path_, ignored);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const fs::path& path() const { return path_; }
+  /// Of the system, where the file could not be made; else 0.
+  int error() const { return error_; }
+
+  void rename_to(const fs::path& file, std::error_code& error) {
+    fs::rename(path_, file, error);
+    is_mine_ = static_cast<bool>(error);  // another process may have the name by now
+  }
+
+ private:
+  fs::path path_;
+  int error_ = 0;
+  bool is_mine_ = false;
 };
 
 /// `error`: of the system, 0 where it gave none.
@@ -74,6 +97,9 @@ fs::path require_folder_of(const fs::path& file, const fs::path& path) {
               " does not exist; create it first.");
 }
 
+/// Of a stream that writes into a file that is there, and makes none.
+constexpr std::ios::openmode only_existing = std::ios::in;
+
 void write_checked(const fs::path& file, std::ios::openmode mode, const fs::path& path,
                    const std::function<void(std::ostream&)>& write) {
   errno = 0;
@@ -88,10 +114,11 @@ void write_checked(const fs::path& file, std::ios::openmode mode, const fs::path
 void write_file(const fs::path& path, const std::function<void(std::ostream&)>& write) {
   const fs::path file = file_to_replace(path);
   if (file.empty()) return write_checked(path, std::ios::app, path, write);
-  const RemoveOnExit temporary{temporary_in(require_folder_of(file, path))};
-  write_checked(temporary.path, std::ios::trunc, path, write);
+  TemporaryFile temporary(require_folder_of(file, path));
+  if (temporary.error() != 0) throw cannot_write(path, temporary.error());
+  write_checked(temporary.path(), only_existing, path, write);
   std::error_code error;
-  fs::rename(temporary.path, file, error);
+  temporary.rename_to(file, error);
   if (error) throw cannot_write(path, error.value());
 }
 
@@ -102,8 +129,8 @@ void prepare_output_folder(const fs::path& folder) {
     throw Error("Cannot create the output folder " + folder.string() +
                 (error ? ": " + error.message() : "") + "; choose another one.");
   }
-  const RemoveOnExit probe{temporary_in(folder)};
-  if (!std::ofstream(probe.path).put('\n').flush()) {
+  const TemporaryFile probe(folder);
+  if (probe.error() != 0 || !std::ofstream(probe.path(), only_existing).put('\n').flush()) {
     throw Error("Cannot write into the output folder " + folder.string() +
                 "; check its permissions and free space, or choose another one.");
   }
@@ -112,8 +139,9 @@ void prepare_output_folder(const fs::path& folder) {
 void require_writable(const fs::path& path) {
   const fs::path file = file_to_replace(path);
   if (file.empty()) return;
-  const RemoveOnExit probe{temporary_in(require_folder_of(file, path))};
-  write_checked(probe.path, std::ios::trunc, path, [](std::ostream& stream) { stream << "\n"; });
+  const TemporaryFile probe(require_folder_of(file, path));
+  if (probe.error() != 0) throw cannot_write(path, probe.error());
+  write_checked(probe.path(), only_existing, path, [](std::ostream& stream) { stream << "\n"; });
 }
 
 void write_text(const fs::path& path, const std::string& text) {

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/distance.h"
+#include "geometry/validation.h"
 #include "io/bgr8.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
@@ -55,6 +56,7 @@ constexpr int least_width = 64;
 
 /// The picture above an empty strip for a legend, and beside one if it is too narrow.
 cv::Mat with_strip(const cv::Mat& picture, int height) {
+  require_type(picture, CV_8UC3, "The picture");
   cv::Mat result;
   cv::copyMakeBorder(picture, result, 0, height, 0, std::max(0, least_width - picture.cols),
                      cv::BORDER_CONSTANT, paper_colour);
@@ -104,6 +106,7 @@ cv::Mat with_bar(const cv::Mat& picture, int map,
 }  // namespace
 
 ColourRange robust_range(const cv::Mat& distance) {
+  require_type(distance, CV_32FC1, "The distance map");
   std::vector<float> inverse;
   for (auto it = distance.begin<float>(); it != distance.end<float>(); ++it) {
     if (has_distance(*it)) inverse.push_back(1 / *it);
@@ -115,6 +118,7 @@ ColourRange robust_range(const cv::Mat& distance) {
 }
 
 cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range) {
+  require_type(distance, CV_32FC1, "The distance map");
   const double low = 1 / range.farthest;
   const double high = 1 / range.nearest;
   cv::Mat valid = distance > 0;
@@ -126,6 +130,7 @@ cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range) {
 }
 
 cv::Mat normal_picture(const cv::Mat& normals) {
+  require_type(normals, CV_32FC3, "The normal map");
   cv::Mat picture(normals.size(), CV_8UC3, no_value);
   const auto level = [](float share) { return cv::saturate_cast<uchar>(255 * share); };
   for (int y = 0; y < normals.rows; ++y) {
@@ -140,11 +145,14 @@ cv::Mat normal_picture(const cv::Mat& normals) {
 }
 
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high) {
+  require_type(map, CV_32FC1, "The map to show");
   return coloured((map - low) / (high - low), cv::Mat(map.size(), CV_8U, 255),
                   cv::COLORMAP_VIRIDIS);
 }
 
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
+  require_image(image, "The image");
+  require_map(reasons, image.size(), CV_16UC1, "The map of reasons");
   cv::Mat picture = to_bgr8(image);
   // The lowest bit that is set shows, but what was filled shows as that.
   for (std::size_t bit = reason_styles.size() - 1; bit-- > 0;) {
@@ -158,12 +166,12 @@ cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_fr
                       cv::Size size) {
   cv::Mat picture(size, CV_8UC3, no_value);
   cv::Mat_<float> nearest(size, std::numeric_limits<float>::max());
-  const Eigen::Isometry3f viewer = world_from_viewer.inverse().cast<float>();
+  const Eigen::Isometry3d viewer = world_from_viewer.inverse();
   const float focal = 0.5f * static_cast<float>(size.width);
   const Eigen::Vector2f centre(0.5f * static_cast<float>(size.width - 1),
                                0.5f * static_cast<float>(size.height - 1));
   for (const CloudPoint& point : cloud) {
-    const Eigen::Vector3f p = viewer * point.position;
+    const Eigen::Vector3f p = (viewer * point.position.cast<double>()).cast<float>();
     if (p.z() <= 0) continue;
     const Eigen::Vector2f pixel = centre + focal / p.z() * p.head<2>();
     // Left out before the conversion to whole numbers, which may overflow.
@@ -228,6 +236,7 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
   std::vector<cv::Mat> pictures;
   int height = 0;
   for (const Panel& panel : panels) {
+    require_image(panel.picture, "The panel " + panel.title);
     cv::Mat picture = with_strip(to_bgr8(panel.picture), 0);
     const double factor = static_cast<double>(width) / picture.cols;
     cv::resize(picture, picture, {width, std::max(1, static_cast<int>(picture.rows * factor))}, 0,

@@ -6,9 +6,10 @@
 #include <ostream>
 
 #include "geometry/distance.h"
+#include "geometry/validation.h"
 #include "io/bgr8.h"
+#include "io/point_cloud.h"
 #include "text/number.h"
-#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
 namespace widestereo {
@@ -24,23 +25,33 @@ void append(std::vector<char>& bytes, const T& value) {
 
 }  // namespace
 
+void require_cloud_maps(const cv::Mat& distance, const cv::Mat& rays, const cv::Mat& normals,
+                        const cv::Mat& image, const cv::Mat& confidence,
+                        const std::string& of_view) {
+  const cv::Size size = distance.size();
+  require_type(distance, CV_32FC1, "The distance map" + of_view);
+  require_map(rays, size, CV_32FC4, "The map of rays" + of_view);
+  require_optional_map(normals, size, CV_32FC3, "The normal map" + of_view);
+  require_optional_map(confidence, size, CV_32FC1, "The confidence map" + of_view);
+  if (image.empty()) return;
+  require_image(image, "The image" + of_view);
+  require_size(image, size, "The image" + of_view);
+}
+
 PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const cv::Mat& normals,
                             const cv::Mat& image, const cv::Mat& confidence,
                             const Eigen::Isometry3d& world_from_camera) {
-  for (const cv::Mat& map : {rays, normals, image, confidence}) {
-    if (!map.empty() && map.size() != distance.size()) {
-      throw Error("The maps of a point cloud differ in size; use maps of one view.");
-    }
-  }
-  const Eigen::Isometry3f world = world_from_camera.cast<float>();
+  require_cloud_maps(distance, rays, normals, image, confidence, "");
+  const Eigen::Matrix3f rotation = world_from_camera.linear().cast<float>();
   const cv::Mat colours = to_bgr8(image);
   PointCloud cloud;
   for (int y = 0; y < distance.rows; ++y) {
     for (int x = 0; x < distance.cols; ++x) {
       const float d = distance.at<float>(y, x);
-      if (!has_distance(d)) continue;
       const cv::Vec4f& ray = rays.at<cv::Vec4f>(y, x);
-      CloudPoint point{world * Eigen::Vector3f(d * ray[0], d * ray[1], d * ray[2]),
+      if (!has_point(d, ray)) continue;
+      const Eigen::Vector3f seen(d * ray[0], d * ray[1], d * ray[2]);
+      CloudPoint point{(world_from_camera * seen.cast<double>()).cast<float>(),
                        Eigen::Vector3f::Zero(),
                        255,
                        255,
@@ -48,7 +59,7 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
                        1};
       if (!normals.empty()) {
         const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
-        point.normal = world.linear() * Eigen::Vector3f(n[0], n[1], n[2]);
+        point.normal = rotation * Eigen::Vector3f(n[0], n[1], n[2]);
       }
       if (!colours.empty()) {
         const cv::Vec3b& bgr = colours.at<cv::Vec3b>(y, x);
@@ -76,7 +87,7 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
   }
   write_file(path, [&](std::ostream& stream) {
     stream << "ply\nformat binary_little_endian 1.0\n"
-           << "comment world frame and unit of the calibration\n"
+           << "comment world frame and unit of the cameras' poses\n"
            << "element vertex " << text_of(cloud.size()) << "\n"
            << "property float x\nproperty float y\nproperty float z\n"
            << "property float nx\nproperty float ny\nproperty float nz\n"

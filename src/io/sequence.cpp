@@ -54,14 +54,14 @@ struct Images {
 Images images_in(const fs::path& folder) {
   Images images;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (entry.is_regular_file(error) && is_image(entry.path())) {
-      const auto [place, is_new] =
-          images.of_frames.emplace(entry.path().stem().string(), entry.path());
-      if (!is_new) {
-        throw Error("The frame " + place->first + " has two images, " + place->second.string() +
-                    " and " + entry.path().filename().string() + "; leave one.");
-      }
+  for (fs::directory_iterator entry(folder, error), end; entry != end; entry.increment(error)) {
+    std::error_code ignored;  // a link to nothing is no image
+    const fs::path& path = entry->path();
+    if (!entry->is_regular_file(ignored) || !is_image(path)) continue;
+    const auto [place, is_new] = images.of_frames.emplace(path.stem().string(), path);
+    if (!is_new) {
+      throw Error("The frame " + place->first + " has two images, " + place->second.string() +
+                  " and " + path.filename().string() + "; leave one.");
     }
   }
   if (error)

@@ -134,9 +134,6 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   }
   if (!layout) throw Error("There are no poses in " + path.string() + ".");
   if (layout->comma_separated()) trajectory.body = Body::imu;
-  std::stable_sort(
-      trajectory.poses.begin(), trajectory.poses.end(),
-      [](const StampedPose& a, const StampedPose& b) { return a.seconds < b.seconds; });
   return trajectory;
 }
 
@@ -151,8 +148,11 @@ std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
 
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
                                                const std::vector<std::size_t>& chosen,
-                                               const std::vector<StampedPose>& trajectory,
+                                               std::vector<StampedPose> trajectory,
                                                double tolerance, const std::string& name) {
+  const auto is_earlier = [](const StampedPose& a, const StampedPose& b) {
+    return a.seconds < b.seconds;
+  };
   const bool have_times = std::all_of(frames.begin(), frames.end(), [](const SequenceFrame& frame) {
     return frame.nanoseconds.has_value();
   });
@@ -163,10 +163,18 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
                   std::to_string(frames.size()) +
                   " frames without time stamps; give one pose for each frame.");
     }
+    // Whether frame k's is the k-th of the file or the k-th in time, nobody could tell.
+    const auto late = std::is_sorted_until(trajectory.begin(), trajectory.end(), is_earlier);
+    if (late != trajectory.end()) {
+      throw Error(name + ": pose " + std::to_string(late - trajectory.begin() + 1) +
+                  " is earlier than the one before it, but frames without time stamps take poses "
+                  "in their order; sort the file by time.");
+    }
     for (const std::size_t i : chosen) poses.push_back(trajectory[i].world_from_body);
     return poses;
   }
   if (trajectory.empty()) throw Error("There are no poses in " + name + ".");
+  std::stable_sort(trajectory.begin(), trajectory.end(), is_earlier);
   for (const std::size_t i : chosen) {
     const SequenceFrame& frame = frames[i];
     const double seconds = static_cast<double>(*frame.nanoseconds) * 1e-9;

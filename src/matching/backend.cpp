@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -30,11 +31,7 @@ void ScheduleProgress::advance(long long samples) {
 }
 
 void require_map(const cv::Mat& map, int view, cv::Size size, int type) {
-  if (map.size() == size && map.type() == type) return;
-  throw Error("The map for view " + std::to_string(view) + " is " + std::to_string(map.cols) + "x" +
-              std::to_string(map.rows) + " of type " + cv::typeToString(map.type()) + ", but " +
-              std::to_string(size.width) + "x" + std::to_string(size.height) + " of " +
-              cv::typeToString(type) + " is needed.");
+  require_map(map, size, type, "The map for view " + std::to_string(view));
 }
 
 void require_constants(const Schedule& schedule, const KernelConstants& constants) {

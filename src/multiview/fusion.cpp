@@ -10,6 +10,7 @@
 
 #include "geometry/angle.h"
 #include "geometry/distance.h"
+#include "io/point_cloud.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -30,9 +31,11 @@ struct ViewCloud {
 };
 
 ViewCloud cloud_of(const View& view, const ViewMaps& maps) {
-  require_calibrated_size(maps.distance, view, "The distances of " + view.name);
+  require_calibrated_size(maps.distance, view, "The distance map of " + view.name);
   ViewCloud cloud;
   const cv::Mat rays = ray_image(view.camera, view.mask);
+  require_cloud_maps(maps.distance, rays, maps.normals, maps.image, maps.confidence,
+                     " of " + view.name);
   cloud.points = make_point_cloud(maps.distance, rays, maps.normals, maps.image, maps.confidence,
                                   view.world_from_camera);
   cloud.points.shrink_to_fit();
@@ -40,7 +43,8 @@ ViewCloud cloud_of(const View& view, const ViewMaps& maps) {
   int count = 0;
   for (int y = 0; y < cloud.index.rows; ++y) {
     for (int x = 0; x < cloud.index.cols; ++x) {
-      cloud.index.at<int>(y, x) = has_distance(maps.distance.at<float>(y, x)) ? count++ : no_point;
+      const bool has = has_point(maps.distance.at<float>(y, x), rays.at<cv::Vec4f>(y, x));
+      cloud.index.at<int>(y, x) = has ? count++ : no_point;
     }
   }
   return cloud;
@@ -288,20 +292,12 @@ PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<st
     }
   }
   if (views.empty()) return {};
-  // Single precision is not enough for what lies far from the origin, as in national grids.
-  const Eigen::Vector3d origin = views.front().world_from_camera.translation();
-  std::vector<View> near = views;
-  for (View& view : near) view.world_from_camera.translation() -= origin;
-  Fusion fusion(near, maps, options);
-  for (std::size_t i = 0; i < near.size(); ++i) {
+  Fusion fusion(views, maps, options);
+  for (std::size_t i = 0; i < views.size(); ++i) {
     fusion.add(i, others[i]);
-    if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(near.size()));
+    if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(views.size()));
   }
-  PointCloud cloud = fusion.take();
-  for (CloudPoint& point : cloud) {
-    point.position = (point.position.cast<double>() + origin).cast<float>();
-  }
-  return cloud;
+  return fusion.take();
 }
 
 }  // namespace widestereo

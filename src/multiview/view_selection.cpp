@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "geometry/angle.h"
+#include "geometry/validation.h"
 
 namespace widestereo {
 namespace {
@@ -65,11 +66,15 @@ class ViewSelection::Implementation {
       std::vector<std::size_t>& observers = points_[i].observers;
       std::sort(observers.begin(), observers.end());
       observers.erase(std::unique(observers.begin(), observers.end()), observers.end());
-      for (const std::size_t observer : observers) seen_.at(observer).push_back(i);
+      for (const std::size_t observer : observers) {
+        require_view(observer);
+        seen_[observer].push_back(i);
+      }
     }
   }
 
   std::vector<std::size_t> sources(std::size_t view, std::size_t count) const {
+    require_view(view);
     std::vector<std::pair<double, std::size_t>> ranked;
     for (const auto& [other, worth] : worth_of_others(view)) ranked.emplace_back(-worth, other);
     std::sort(ranked.begin(), ranked.end());
@@ -98,12 +103,16 @@ class ViewSelection::Implementation {
   }
 
  private:
+  void require_view(std::size_t number) const {
+    require_number(number, centres_.size(), "view", "The selection");
+  }
+
   /// What matching with other views promises; those that promise nothing are missing.
   using Worths = std::map<std::size_t, double>;
 
   Worths worth_of_others(std::size_t view) const {
     Worths worths;
-    const Eigen::Vector3d& centre = centres_.at(view);
+    const Eigen::Vector3d& centre = centres_[view];
     for (const std::size_t number : seen_[view]) {
       const ObservedPoint& point = points_[number];
       for (const std::size_t other : point.observers) {

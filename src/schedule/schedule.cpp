@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "geometry/angle.h"
 #include "geometry/camera_parameters.h"
 #include "kernel/enumerations.h"
 #include "widestereo/error.h"
@@ -36,13 +37,13 @@ kernel::ViewPair view_pair(const Eigen::Isometry3d& source_from_reference) {
 /// `all`: the rig's views, which are `images`, and then those at coarser levels.
 kernel::MatchParameters match_parameters(const std::vector<View>& all, int images,
                                          const Options& options) {
-  constexpr double degree = std::numbers::pi / 180;
   const auto single = [](double value) { return static_cast<float>(value); };
   kernel::MatchParameters p{};
   p.range = {single(options.min_distance), single(options.max_distance),
              single(1 / options.max_distance), single(1 / options.min_distance)};
   p.patch_limits = {single(std::pow(options.min_texture / 255, 2)), single(options.min_visible),
-                    single(std::cos(options.max_tilt * degree)), single(options.min_support)};
+                    single(std::cos(options.max_tilt * radians_per_degree)),
+                    single(options.min_support)};
   p.check_limits = {single(options.consistency_relative), single(options.consistency_pixels),
                     single(options.max_cost), single(options.min_parallax)};
   const auto inverse_scale = [](double grey_levels) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <numbers>
 
+#include "geometry/angle.h"
 #include "synthesis/render.h"
 
 namespace widestereo {
@@ -11,8 +11,6 @@ using synthesis::Paint;
 using synthesis::Scene;
 using Pattern = synthesis::Paint::Pattern;
 
-constexpr double degree = std::numbers::pi / 180;
-
 Paint paint(const Vector3d& colour, const Vector3d& second, Pattern pattern, double scale,
             double contrast = 1) {
   return {colour, second, pattern, scale, contrast};
@@ -21,9 +19,9 @@ Paint paint(const Vector3d& colour, const Vector3d& second, Pattern pattern, dou
 Eigen::Isometry3d pose(const Vector3d& position, double yaw, double pitch = 0, double roll = 0) {
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
   result.translate(position);
-  result.rotate(Eigen::AngleAxisd(yaw * degree, Vector3d::UnitY()) *
-                Eigen::AngleAxisd(pitch * degree, Vector3d::UnitX()) *
-                Eigen::AngleAxisd(roll * degree, Vector3d::UnitZ()));
+  result.rotate(Eigen::AngleAxisd(yaw * radians_per_degree, Vector3d::UnitY()) *
+                Eigen::AngleAxisd(pitch * radians_per_degree, Vector3d::UnitX()) *
+                Eigen::AngleAxisd(roll * radians_per_degree, Vector3d::UnitZ()));
   return result;
 }
 
@@ -78,7 +76,7 @@ Rig demo_rig(int size) {
     camera.cy = (i == 0 ? 0.5005 : 0.5012) * size;
     camera.xi = i == 0 ? -0.165 : -0.168;
     camera.alpha = i == 0 ? 0.590 : 0.592;
-    camera.max_theta = 97.5 * degree;
+    camera.max_theta = 97.5 * radians_per_degree;
   }
   rig.views[1].world_from_camera = pose({0.1, 0.002, -0.001}, -0.4, 2.2, 0.3);
   return rig;
@@ -90,7 +88,7 @@ Rig surround_rig(int size) {
   constexpr int cameras = 4;
   const auto on_circle = [](int i) {
     return Eigen::Isometry3d(
-        Eigen::AngleAxisd(i * (360 / cameras) * degree, Eigen::Vector3d::UnitY()) *
+        Eigen::AngleAxisd(i * (360 / cameras) * radians_per_degree, Eigen::Vector3d::UnitY()) *
         Eigen::Translation3d(0, 0, 0.2));
   };
   for (int i = 0; i < cameras; ++i) {
@@ -98,7 +96,7 @@ Rig surround_rig(int size) {
     view.name = "cam" + std::to_string(i);
     view.world_from_camera = on_circle(0).inverse() * on_circle(i);
     // The same lenses with the whole of their wider field of view in the image.
-    view.camera.max_theta = 110 * degree;
+    view.camera.max_theta = 110 * radians_per_degree;
     for (double* focal_length : {&view.camera.fx, &view.camera.fy}) *focal_length *= 0.73;
   }
   return rig;

@@ -26,7 +26,7 @@ Options exact(Options options) {
   return options;
 }
 
-Options small_options(const RenderedPair&) {
+Options small_options() {
   Options options;
   std::tie(options.min_distance, options.max_distance) = demo_distance_range();
   options.window_radius = 3;
@@ -116,7 +116,7 @@ TEST_P(Parity, InitialPlanesAndCostsAgree) {
                                      {PatchWarp::affine, Filter::device}}) {
     // Texture units round positions to 1/512 pixel.
     const double rounding = filter == Filter::exact ? 1 : 10;
-    Options options = small_options(pair);
+    Options options = small_options();
     options.warp = warp;
     options.filter = filter;
     const Schedule schedule = make_schedule(pair.rig, options);
@@ -154,7 +154,7 @@ TEST_P(Parity, WholeMatchAgrees) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   Device cpu = Device::open("cpu");
   const RenderedPair pair = render_demo(128);
-  Options options = exact(small_options(pair));
+  Options options = exact(small_options());
   options.first_iterations = 8;
   const StereoResult expected = Matcher(cpu, pair.rig, options).match(images_of(pair));
   const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
@@ -347,7 +347,7 @@ class EveryDevice : public ::testing::TestWithParam<const char*> {};
 TEST_P(EveryDevice, FindsTheDemoSceneTwiceWithTheSameBits) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   const RenderedPair pair = render_demo(128);
-  Options options = small_options(pair);
+  Options options = small_options();
   options.first_iterations = 10;
   Matcher matcher(*device, pair.rig, options);
   const StereoResult first = matcher.match(images_of(pair));
@@ -470,7 +470,7 @@ TEST_P(EveryDevice, UsesThreeViews) {
 TEST_P(EveryDevice, RejectsWhatItCannotMatch) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   const RenderedPair pair = render_demo(64);
-  const Options options = small_options(pair);
+  const Options options = small_options();
   Matcher matcher(*device, pair.rig, options);
   std::vector<cv::Mat> images = images_of(pair);
   EXPECT_THROW(matcher.match({images[0]}), Error);
@@ -500,7 +500,7 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
     return evaluate(result.views[0].distance, result.views[0].normals, pair.views[0].truth,
                     pair.rig.views[0], pair.rig.views[1])[1];
   };
-  Options random = small_options(pair);
+  Options random = small_options();
   random.window_radius = 5;
   random.first_iterations = 8;
   Options fast = Options::preset_named("fast");
@@ -671,7 +671,7 @@ TEST(Launches, OverSeveralViewsMayRunThemInAnyOrder) {
 TEST(Checkerboard, ReachesRasterOrder) {
   Device cpu = Device::open("cpu");
   const RenderedPair pair = render_demo(96);
-  Options options = small_options(pair);
+  Options options = small_options();
   options.first_iterations = 6;
   const StereoResult checkerboard = Matcher(cpu, pair.rig, options).match(images_of(pair));
   options.propagation = Propagation::raster;

@@ -383,6 +383,27 @@ TEST_F(Colmap, BadTextNamesFileAndLine) {
   EXPECT_NE(error().find("images.txt line 2 lacks"), std::string::npos) << error();
 }
 
+TEST_F(Colmap, SizesMustBeWholeNumbersOfPixels) {
+  for (const std::string size : {"1919.9 1080", "1920 0", "1920 -1e300", "1e300 1080"}) {
+    const std::string message =
+        test::error_of([&] { camera("SIMPLE_PINHOLE " + size + " 900 960 540"); });
+    EXPECT_NE(message.find("cameras.txt: A camera's size is "), std::string::npos) << message;
+  }
+  EXPECT_NE(test::error_of([&] { camera("EQUIRECTANGULAR -1e300 4 8 4"); }), "");
+}
+
+TEST_F(Colmap, NumbersOfNoImageAreErrors) {
+  write_text();
+  const SfmModel model(folder_.path());
+  const std::string expected = folder_.path().string() + " has no image number 3 among its 3";
+  for (const std::string& message : {test::error_of([&] { model.calibrated({0, 3}); }),
+                                     test::error_of([&] { model.distances({3}); })}) {
+    EXPECT_NE(message.find(expected), std::string::npos) << message;
+  }
+  EXPECT_NE(test::error_of([&] { model.selection().sources(3, 1); }).find("no view number 3"),
+            std::string::npos);
+}
+
 TEST_F(Colmap, MissingPartsAreErrors) {
   EXPECT_NE(error().find("is no COLMAP model"), std::string::npos);
   EXPECT_FALSE(is_sfm_model(folder_.path()));

@@ -114,7 +114,7 @@ TEST(Epipolar, LeavesOutMatchesAtTheEpipole) {
 }
 
 TEST(Epipolar, RealPairsAreAsGoodAsTheirCalibration) {
-  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  SKIP_WITHOUT_STEREO_SETS();
   const auto set = test::data_folder() / "real/vfs_t265_fs";
   const Rig rig = read_calibration(set / "calib.yaml").rig;
   const EpipolarReport report =

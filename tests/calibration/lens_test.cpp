@@ -119,7 +119,7 @@ TEST(LensRim, NeedsImagesOfTheCalibratedSize) {
 }
 
 TEST(LensRim, OfARealLens) {
-  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  SKIP_WITHOUT_STEREO_SETS();
   const auto set = test::data_folder() / "real/calicam_shun74";
   const Rig rig = read_calibration(set / "calib.yaml").rig;
   for (std::size_t i = 0; i < 2; ++i) {

@@ -152,6 +152,8 @@ TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
          "rigid");
   expect(file(R"("w": 9, "h": 9)", frame("a.png")), "fl_x");
   expect(file(R"("fl_x": 9, "h": 9)", frame("a.png")), "\"w\"");
+  expect(file(R"("fl_x": 900, "w": 1919.9, "h": 1080)", frame("a.png")), "1919.9x1080");
+  expect(file(R"("fl_x": 900, "w": -1e300, "h": 1080)", frame("a.png")), "whole numbers of pixels");
   for (const char* name : {"ORTHOPHOTO", "EUCM"}) {
     expect(
         file(R"("camera_model": ")" + std::string(name) + R"(", "w": 9, "h": 9)", frame("a.png")),

@@ -172,7 +172,7 @@ TEST(Sharpness, BlurOfNothingIsTheImage) {
 }
 
 TEST(Sharpness, OfRenderedPairs) {
-  if (test::data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  SKIP_WITHOUT_STEREO_SETS();
   for (const char* set : {"desk_tumvi", "warehouse_expo", "street_forward_omni"}) {
     SCOPED_TRACE(set);
     const auto folder = test::data_folder() / "synthetic" / set;

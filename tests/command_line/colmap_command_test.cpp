@@ -180,6 +180,39 @@ TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/cloud_preview.png"));
 }
 
+/// Positions are exact in binary in both places, so that single precision alone could differ.
+TEST_F(ReconstructCommand, NationalGridsLoseNoPrecision) {
+  replace_in_model("model/images.txt", "-0.1 0 0", "-0.125 0 0");
+  const std::string pair = "depth " + file("images/left.png") + " " + file("images/right/1.png") +
+                           " -c " + file("model") +
+                           " --preset paper --device cpu --iterations 2"
+                           " --second-iterations 1 --window-radius 2 --no-pictures -o ";
+  ASSERT_EQ(run(reconstruct("near") + "--min-views 1").exit_code, 0);
+  ASSERT_EQ(run(pair + file("near_pair")).exit_code, 0);
+  const nlohmann::json near = nlohmann::json::parse(bytes_of("near/reconstruction.json"));
+  EXPECT_EQ(near["cloud"]["origin"], (nlohmann::json{0, 0, 0}));
+  EXPECT_EQ(record_of("near_pair")["origin"], (nlohmann::json{0, 0, 0}));
+
+  replace_in_model("model/images.txt", "1 0 0 0 -0.125 0 0", "1 0 0 0 -600000.125 -5700000 0");
+  replace_in_model("model/images.txt", "1 0 0 0 0 0 0", "1 0 0 0 -600000 -5700000 0");
+  replace_in_model("model/images.txt", "1 0 0 0 5 0 0", "1 0 0 0 -599995 -5700000 0");
+  replace_in_model("model/points3D.txt", " 0 0 1 ", " 600000 5700000 1 ");
+  replace_in_model("model/points3D.txt", " 0 0 4 ", " 600000 5700000 4 ");
+  const Outcome outcome = run(reconstruct("far") + "--min-views 1");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("relative to (600000, 5700000, 0)"), std::string::npos)
+      << outcome.output;
+  ASSERT_EQ(run(pair + file("far_pair")).exit_code, 0);
+  const nlohmann::json origin = {600'000, 5'700'000, 0};
+  const nlohmann::json far = nlohmann::json::parse(bytes_of("far/reconstruction.json"));
+  EXPECT_EQ(far["cloud"]["origin"], origin);
+  EXPECT_EQ(record_of("far/left.png")["origin"], origin);
+  EXPECT_EQ(record_of("far_pair")["origin"], origin);
+  EXPECT_EQ(record_of("far_pair")["views"][1]["world_from_camera"][3], 0.125);
+  EXPECT_TRUE(bytes_of("far/cloud.ply") == bytes_of("near/cloud.ply"));
+  EXPECT_TRUE(bytes_of("far_pair/cloud0.ply") == bytes_of("near_pair/cloud0.ply"));
+}
+
 TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   const std::string left = bytes_of("out/left.png/result.json");
@@ -216,6 +249,20 @@ TEST_F(ReconstructCommand, ReplacedImagesAreMatchedAgain) {
   cv::imwrite(file("images/left.png"), image);
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   EXPECT_FALSE(bytes_of("out/left.png/distance0.tiff") == before);
+}
+
+TEST_F(ReconstructCommand, ResultsOfAnUnknownGroupAreMatchedAgain) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  const nlohmann::json whole = record();
+  auto damaged = nlohmann::ordered_json::parse(bytes_of("out/reconstruction.json"));
+  damaged["images"][0].erase("group");
+  folder_.write("out/reconstruction.json", damaged.dump());
+  const Outcome outcome = run(reconstruct());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  ASSERT_EQ(record()["images"].size(), 2U);
+  // What was kept comes first.
+  EXPECT_EQ(record()["images"][0], whole["images"][1]);
+  EXPECT_EQ(record()["images"][1]["group"], whole["images"][0]["group"]);
 }
 
 TEST_F(ReconstructCommand, MasksAreOfEachImage) {

@@ -151,7 +151,7 @@ TEST_F(MovingCamera, NeedsAPoseForEachImage) {
 
 /// As accurate as the data set says its odometry is.
 TEST_F(MovingCamera, OfARealCarFitsItsPoses) {
-  if (data_folder().empty()) GTEST_SKIP() << "no ../shared/data beside the project";
+  SKIP_WITHOUT_STEREO_SETS();
   const fs::path set = data_folder() / "real/psl_fisheye_left";
   const std::string image = (set / "images/mono_left_1342626147").string();
   const Outcome outcome =
@@ -237,6 +237,20 @@ TEST_F(RefusedWords, NoneIsEmpty) {
   expect_refusal("depth '' " + file("right.png") + " -c x -o " + file("out"),
                  "images: the value is empty");
   expect_refusal("benchmark --devices cpu --sizes 64 -o ''", "--output: the value is empty");
+}
+
+TEST_F(RefusedWords, WholeNumbersAreDecimalDigits) {
+  for (const char* word : {"0x10", "1.5", "1e3", "' 1'", "'1 '", "-", "+", "1_0"}) {
+    expect_refusal(sequence() + "--first " + word, " is no whole number");
+  }
+  expect_refusal(sequence() + "--views 0,0x1", "--views: 0x1 is no whole number");
+  expect_refusal(sequence() + "--seed 0b1", "--seed: 0b1 is no whole number");
+  expect_refusal(sequence() + "--step 000", "--step: 0 is no number above 0");
+  const Outcome outcome =
+      run("demo --size 00064 --seed +010 --preset fast --device cpu --json --no-pictures -o " +
+          file("decimal"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(nlohmann::json::parse(outcome.output)["options"]["seed"], 10);
 }
 
 TEST_F(RefusedWords, LimitsAreShort) {
@@ -366,7 +380,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
   expect_error("evaluate " + file("prediction.tiff") + " -c " + file("calib.yaml") + " --truth " +
                    file("normals.tiff"),
-               "The ground truth has 3 32-bit floats a pixel instead of 1 32-bit float;");
+               "The ground truth is CV_32FC3 instead of CV_32FC1;");
   cv::imwrite(file("confidence.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
   const Outcome curve = run("evaluate " + file("prediction.tiff") + common +
                             " --json --confidence " + file("confidence.tiff"));
@@ -664,6 +678,8 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   EXPECT_EQ(unknown.exit_code, 0) << unknown.output;
   EXPECT_EQ(unknown.output.find("% of"), std::string::npos) << unknown.output;
   expect_error("benchmark --sizes 64 --peak-gbps 10", "--devices");
+  // Nothing is timed, nor a header printed.
+  expect_error("benchmark --devices cpu --devices nope --sizes 64", "no device \"nope\"");
   EXPECT_NE(run("benchmark --sizes 64 --plot " + file("speed.png")).exit_code, 0);
 }
 

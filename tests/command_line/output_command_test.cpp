@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the command writes, where it cannot, and what an earlier run has left.
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -141,6 +142,16 @@ TEST_F(Output, PngsMustHoldTheFarthestDistance) {
   EXPECT_EQ(run(depth + " --formats png --max-distance 65.535").exit_code, 0);
 }
 
+TEST_F(Output, PngsMustHoldTheNearestDistance) {
+  const std::string depth = depth_of("left.png", "right.png") + "--formats png ";  // from 0.4 on
+  expect_error(depth + "--png-scale 1",
+               "from 0.5 on at --png-scale 1, but they begin at 0.4; give --png-scale 1000, say");
+  std::string far = depth;
+  far.replace(far.find("--max-distance 8"), 16, "--max-distance 66000");
+  expect_error(far + "--png-scale 1", "reach to 66000; leave png out of --formats");
+  EXPECT_EQ(run(depth + "--png-scale 2").exit_code, 0);
+}
+
 TEST_F(Output, NamesNeedNotBeUtf8) {
   fs::copy_file(file("left.png"), file("l\xe9"
                                        "ft.png"));
@@ -218,6 +229,17 @@ TEST_F(Output, EarlierResultsAreRemoved) {
     expected.insert(std::string("reasons") + view + ".png");
   }
   EXPECT_EQ(files_in("out"), expected);
+}
+
+TEST_F(Output, TwoRunsNeedTwoFolders) {
+  fs::create_directories(folder_ / "out");
+  const int other = open((folder_ / "out").c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(flock(other, LOCK_EX | LOCK_NB), 0);
+  folder_.write("out/.writing-1-0", "of the other run");
+  expect_error(depth_of("left.png", "right.png"), "Another run is writing to");
+  expect_error("demo --size 64 --device cpu -o " + file("out"), "Another run is writing to");
+  EXPECT_EQ(files_in("out"), std::set<std::string>{".writing-1-0"});
+  close(other);
 }
 
 TEST_F(Output, InterruptedResultsHaveNoRecord) {

@@ -175,13 +175,18 @@ TEST_F(SequenceCommand, FoldersOfOthersAreLeftAlone) {
   const std::string depth = "depth " + file("data/cam0/000.png") + " " + file("data/cam1/000.png") +
                             " -c " + file("calib.yaml") + quick;
   ASSERT_EQ(run(depth + " -o " + file("out/000")).exit_code, 0);
-  const std::string theirs = bytes_of(folder_ / "out/000/result.json");
-  const Outcome outcome = run(sequence());
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.output.find("out/000 is there already and is no result of a sequence"),
-            std::string::npos)
-      << outcome.output;
-  EXPECT_TRUE(bytes_of(folder_ / "out/000/result.json") == theirs);
+  const auto expect_left_alone = [&] {
+    const std::string theirs = bytes_of(folder_ / "out/000/result.json");
+    const Outcome outcome = run(sequence());
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find("out/000 is there already and is no result of a sequence"),
+              std::string::npos)
+        << outcome.output;
+    EXPECT_TRUE(bytes_of(folder_ / "out/000/result.json") == theirs);
+  };
+  expect_left_alone();
+  folder_.write("out/000/result.json", R"({"input": {"run": 5}})");
+  expect_left_alone();
 }
 
 TEST_F(SequenceCommand, DamagedRecordsAreRefusedAndDamagedFramesMatchedAgain) {
@@ -202,9 +207,14 @@ TEST_F(SequenceCommand, DamagedRecordsAreRefusedAndDamagedFramesMatchedAgain) {
     EXPECT_NE(outcome.output.find("is no record of a sequence"), std::string::npos)
         << outcome.output;
   }
-  for (const char* text : {"{\"frames\": {}, \"settings\": {}}", "[]", "{\"frames\": [1]", "nan"}) {
+  for (const char* text : {"{\"frames\": {}, \"settings\": {}}", "[]", "{\"frames\": [1]", "nan",
+                           "{\"frames\": [], \"settings\": null}"}) {
     folder_.write("out/sequence.json", text);
-    EXPECT_EQ(run(sequence()).exit_code, 1) << text;
+    const Outcome outcome = run(sequence());
+    EXPECT_EQ(outcome.exit_code, 1) << text;
+    EXPECT_NE(outcome.output.find("is no record of a sequence"), std::string::npos)
+        << text << "\n"
+        << outcome.output;
   }
 }
 
@@ -213,6 +223,14 @@ TEST_F(SequenceCommand, MasksAreTheSameFromEveryFolder) {
   ASSERT_EQ(run(sequence() + "--count 1 --mask " + file("mask.png")).exit_code, 0);
   const Outcome outcome = run(sequence() + "--count 2 --mask " + file("data/../mask.png"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+}
+
+TEST_F(SequenceCommand, ADatasetIsTheSameByEveryName) {
+  ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
+  for (const char* name : {"data/", "data/.", "data/../data//"}) {
+    const Outcome outcome = run(sequence("out", name) + "--count 1");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  }
 }
 
 TEST_F(SequenceCommand, AReplacedMaskIsAnotherSetting) {
@@ -237,6 +255,29 @@ TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
   ASSERT_EQ(alone.exit_code, 0) << alone.output;
   EXPECT_EQ(bytes_of(folder_ / "out/001/distance0.tiff"),
             bytes_of(folder_ / "alone/001/distance0.tiff"));
+}
+
+TEST_F(SequenceCommand, BlackFramesNeitherStartOthersNorHideSceneCuts) {
+  const cv::Mat black(96, 96, CV_8UC1, cv::Scalar(0));
+  for (const char* image : {"cam0/000.png", "cam1/000.png", "cam1/002.png"}) {
+    cv::imwrite(file(std::string("data/") + image), black);
+  }
+  add_frame(2, "003", 3);
+  add_frame(0, "004", 8);
+  const std::string options = "--restart-below 1 --no-motion ";
+  ASSERT_EQ(run(sequence() + options).exit_code, 0);
+  const auto starts = [this](const std::string& output) {
+    std::vector<std::string> all;
+    const nlohmann::json frames = record(output)["frames"];
+    for (const nlohmann::json& frame : frames) all.push_back(frame["start"]);
+    return all;
+  };
+  const std::vector<std::string> expected = {"cold", "cold", "cold after warm", "cold",
+                                             "cold after warm"};
+  EXPECT_EQ(starts("out"), expected);
+  ASSERT_EQ(run(sequence("parts") + options + "--count 3").exit_code, 0);
+  ASSERT_EQ(run(sequence("parts") + options).exit_code, 0);
+  EXPECT_EQ(starts("parts"), expected) << "resumed after the second one";
 }
 
 TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
@@ -438,6 +479,7 @@ TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {
   fs::create_directories(folder_ / "empty/cam0");
   expect(sequence("out", "empty"), "no images");
   expect(sequence() + "--first 3", "3 frames");
+  expect(sequence() + "--first 000010", "no frame 10 to start from");
   expect(sequence() + "--views 0,2", "cam2");
   expect(sequence() + "--folders cam0,none", "none");
   expect(sequence() + "--views 0,1 --folders cam0", "--folders names 1 folders for 2 cameras");

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/evaluation.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "error_of.h"
 #include "widestereo/error.h"
 #include "widestereo/synthesis.h"
 
@@ -78,6 +80,32 @@ TEST_F(FourPixels, OcclusionAndNormalsCount) {
   EXPECT_NEAR(scores[1].mean_normal_angle, 15, 1e-4);
   EXPECT_NEAR(scores[0].mean_normal_angle, 7.5, 1e-4);
   EXPECT_EQ(scores[1].bad_relative.at(0.005), 0);
+}
+
+TEST_F(FourPixels, DisplacementsAreOfPointsInTheSourceImage) {
+  // Pixels 0 to 3 are at u = 250 to 253 there.
+  source_.camera.width = 253;
+  source_.camera.cx = 301.5;
+  cv::Mat distance = truth_.distance.clone();
+  distance.at<float>(0, 1) = 0;  // none
+  std::vector<RegionScores> scores = evaluate(distance, {}, truth_, reference_, source_);
+  for (std::size_t region : {0, 1, 2}) {
+    EXPECT_EQ(scores[region].pixels, 4);
+    EXPECT_NEAR(scores[region].bad_relative.at(0.01), 1 / 4.0, 1e-12);
+    EXPECT_NEAR(scores[region].bad_pixels.at(1), 1 / 3.0, 1e-12);
+    EXPECT_EQ(scores[region].bad_pixels_predicted.at(1), 0);
+  }
+  const cv::Mat confidence = (cv::Mat_<float>(2, 4) << 0.9, 0.1, 0.8, 0.7, 0, 0, 0, 0);
+  const auto curve = sparsification(distance, confidence, truth_, reference_, source_);
+  EXPECT_NEAR(curve.back().bad_pixels, 1 / 3.0, 1e-12);
+  // A map that marks what lies outside says the same of what is visible.
+  truth_.occlusion = (cv::Mat_<uchar>(2, 4) << 255, 255, 255, 128, 255, 255, 255, 255);
+  scores = evaluate(distance, {}, truth_, reference_, source_);
+  EXPECT_EQ(scores[0].pixels, 4);
+  EXPECT_EQ(scores[1].pixels, 3);
+  for (std::size_t region : {0, 1, 2}) {
+    EXPECT_NEAR(scores[region].bad_pixels.at(1), 1 / 3.0, 1e-12);
+  }
 }
 
 TEST_F(FourPixels, FarThingsWithoutGroundTruthAreRightWithinTwoPixels) {
@@ -208,18 +236,23 @@ TEST_F(FourPixels, EmptyAndWrongInputs) {
 
 TEST(Evaluation, TruthScoresPerfectlyInEveryBand) {
   const RenderedPair pair = render_demo(96);
-  const std::vector<RegionScores> scores =
-      evaluate(pair.views[0].truth.distance, pair.views[0].truth.normals, pair.views[0].truth,
-               pair.rig.views[0], pair.rig.views[1]);
+  GroundTruth truth = pair.views[0].truth;
+  const auto score = [&] {
+    return evaluate(truth.distance, truth.normals, truth, pair.rig.views[0], pair.rig.views[1]);
+  };
+  const std::vector<RegionScores> scores = score();
   long in_bands = 0;
   for (const RegionScores& s : scores) {
     EXPECT_GT(s.pixels, 0) << s.region;
     EXPECT_EQ(s.bad_relative.at(0.005), 0) << s.region;
+    EXPECT_EQ(s.bad_pixels.at(0.5), 0) << s.region;
     EXPECT_LT(s.median_pixels, 1e-6) << s.region;
     EXPECT_LT(s.mean_normal_angle, 0.05) << s.region;
   }
   for (std::size_t i = 2; i < scores.size(); ++i) in_bands += scores[i].pixels;
   EXPECT_EQ(in_bands, scores[1].pixels);
+  truth.occlusion.release();
+  for (const RegionScores& s : score()) EXPECT_EQ(s.bad_pixels.at(0.5), 0) << s.region;
 }
 
 TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
@@ -233,6 +266,39 @@ TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   EXPECT_NEAR(s.consistent_pixels, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.low_cost, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.mean_cost, 0.5 / 3, 1e-6);
+}
+
+TEST(Evaluation, MapsThatDoNotFitAreNamed) {
+  using test::error_of;
+  using ::testing::HasSubstr;
+  const cv::Mat cost = cv::Mat::ones(2, 4, CV_32FC1), narrow = cv::Mat::ones(2, 3, CV_32FC1);
+  const cv::Mat differences = cv::Mat::ones(2, 4, CV_32FC2), mask = cv::Mat::ones(2, 4, CV_8UC1);
+  const auto consistency = [](const cv::Mat& a, const cv::Mat& b, const cv::Mat& c) {
+    return error_of([&] { consistency_scores(a, b, c); });
+  };
+  EXPECT_EQ(consistency(differences, cost, mask), "");
+  EXPECT_THAT(consistency({}, cost, {}), HasSubstr("map of differences is empty"));
+  EXPECT_THAT(consistency(cost, cost, {}), HasSubstr("CV_32FC1 instead of CV_32FC2"));
+  EXPECT_THAT(consistency(differences, narrow, {}), HasSubstr("4x2 pixels instead of 3x2"));
+  EXPECT_THAT(consistency(differences, mask, {}), HasSubstr("cost map is CV_8UC1"));
+  EXPECT_THAT(consistency(differences, cost, cost), HasSubstr("textured pixels is CV_32FC1"));
+  EXPECT_THAT(error_of([&] { textured_pixels(cost, mask); }), HasSubstr("image is CV_32FC1"));
+  EXPECT_THAT(error_of([&] { textured_pixels(mask, mask.colRange(0, 3)); }),
+              HasSubstr("3x2 pixels instead of 4x2"));
+  GroundTruth truth;
+  const auto picture = [&truth](const cv::Mat& distance) {
+    return error_of([&] { error_picture(distance, truth); });
+  };
+  EXPECT_THAT(picture(cost), HasSubstr("ground truth is empty"));
+  truth.distance = cost;
+  EXPECT_EQ(picture(cost), "");
+  EXPECT_THAT(picture(narrow), HasSubstr("ground truth is 4x2 pixels instead of 3x2"));
+  EXPECT_THAT(picture(mask), HasSubstr("distance map is CV_8UC1"));
+  truth.valid = cost;
+  EXPECT_THAT(picture(cost), HasSubstr("mask of valid pixels is CV_32FC1"));
+  truth.valid = mask;
+  truth.occlusion = mask.rowRange(0, 1);
+  EXPECT_THAT(picture(cost), HasSubstr("occlusion map is 4x1"));
 }
 
 /// The left half is blank: textured from column 19.

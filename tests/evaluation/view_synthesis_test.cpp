@@ -68,6 +68,12 @@ TEST_F(ViewSynthesis, NeedsMapsOfTheCalibratedSize) {
               ::testing::HasSubstr("distance map of cam0 is 8x9 pixels"));
 }
 
+TEST_F(ViewSynthesis, NeedsABaseline) {
+  Rig rig = pair.rig;
+  rig.views[1].world_from_camera.translation() = rig.views[0].world_from_camera.translation();
+  EXPECT_THAT(error_of([&] { scores_of(truth, rig); }), ::testing::HasSubstr("the same centre"));
+}
+
 TEST_F(ViewSynthesis, NeedsMapsOfTheDocumentedTypes) {
   using ::testing::HasSubstr;
   const View& view = pair.rig.views[0];

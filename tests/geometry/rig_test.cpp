@@ -85,6 +85,16 @@ TEST(ResizedViews, ExcludePixelsThatCoverExcludedOnes) {
   EXPECT_THROW(resized(view, 32, 24), Error);
 }
 
+TEST(RigGeometry, LocalOriginsAreWholeKilometresFarFromTheWorlds) {
+  View view;
+  const auto origin_at = [&view](double x, double y, double z) {
+    view.world_from_camera.translation() = Eigen::Vector3d(x, y, z);
+    return local_origin(view);
+  };
+  EXPECT_EQ(origin_at(9999, -9999, 0), Eigen::Vector3d::Zero());
+  EXPECT_EQ(origin_at(600'499, -5'700'501, 70), Eigen::Vector3d(600'000, -5'701'000, 0));
+}
+
 TEST(RigGeometry, RelativePoseMovesPoints) {
   const Rig rig = two_views();
   const Eigen::Vector3d world(0.5, -0.3, 2);

@@ -367,6 +367,35 @@ TEST(Writing, TakesTheLongestNames) {
   EXPECT_NE(error.find("File name too long"), std::string::npos) << error;
 }
 
+/// A process of another container may have the same ID.
+TEST(Writing, LeavesFilesThatOthersAreWriting) {
+  const TemporaryFolder folder;
+  std::string mine;
+  write_file(folder / "a.txt", [&](std::ostream&) {
+    mine = std::filesystem::directory_iterator(folder.path())->path().filename().string();
+  });
+  const std::size_t number = mine.rfind('-') + 1;
+  std::vector<std::string> others;
+  for (int i = 1; i < 10; ++i) {
+    others.push_back(mine.substr(0, number) + std::to_string(std::stoi(mine.substr(number)) + i));
+    folder.write(others.back(), "theirs");
+  }
+  write_text(folder / "b.txt", "b");
+  prepare_output_folder(folder.path());
+  require_writable(folder / "c.txt");
+  EXPECT_EQ(bytes_of(folder / "b.txt"), "b");
+  for (const std::string& other : others) EXPECT_EQ(bytes_of(folder / other), "theirs") << other;
+}
+
+TEST(Writing, GivesThePermissionsOfAnyNewFile) {
+  const TemporaryFolder folder;
+  const mode_t before = umask(027);
+  write_text(folder / "a.txt", "a");
+  umask(before);
+  EXPECT_EQ(std::filesystem::status(folder / "a.txt").permissions(),
+            static_cast<std::filesystem::perms>(0640));
+}
+
 TEST(Writing, LeavesNothingBehindWhenItFails) {
   const TemporaryFolder folder;
   EXPECT_THROW(write_file(folder / "a.txt",

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/pictures.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <sstream>
 
 #include "comma_locale.h"
+#include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -66,6 +68,14 @@ TEST(Pictures, CloudsAreSeenFromTheViewpoint) {
                 .at<cv::Vec3b>(10, 20),
             picture.at<cv::Vec3b>(0, 0))
       << "it looks the other way";
+}
+
+/// Floats are 0.5 m apart there.
+TEST(Pictures, CloudsAreSeenFromViewpointsBetweenFloats) {
+  const PointCloud cloud = {{{5'700'000.5F, 0, 1}, {0, 0, -1}, 20, 0, 0, 1}};
+  const Eigen::Isometry3d viewer(Eigen::Translation3d(5'700'000.25, 0, 0));
+  // 0.25 m aside at a depth of 1 m, with a focal length of 20 pixels.
+  EXPECT_EQ(cloud_picture(cloud, viewer, {40, 21}).at<cv::Vec3b>(10, 24), cv::Vec3b(0, 0, 20));
 }
 
 TEST(Pictures, ReasonsCoverTheImage) {
@@ -127,6 +137,70 @@ TEST(Pictures, TakeImagesOfAnySize) {
       EXPECT_NO_THROW(cloud_picture({}, Eigen::Isometry3d::Identity(), picture.size()));
     }
   }
+}
+
+TEST(Pictures, RefuseWrongMaps) {
+  using ::testing::HasSubstr;
+  const cv::Mat one = cv::Mat::ones(2, 4, CV_32FC1), wide = cv::Mat::ones(2, 4, CV_64FC1);
+  const cv::Mat bytes = cv::Mat::ones(2, 4, CV_8UC1), bits = cv::Mat::ones(2, 4, CV_16UC1);
+  const auto expect = [](auto make, const char* message) {
+    EXPECT_THAT(test::error_of(make), HasSubstr(message));
+  };
+  expect([&] { robust_range(wide); }, "distance map is CV_64FC1 instead of CV_32FC1");
+  expect([&] { robust_range({}); }, "distance map is empty");
+  expect([&] { distance_picture(bytes, {1, 2}); }, "distance map is CV_8UC1");
+  expect([&] { normal_picture(one); }, "normal map is CV_32FC1");
+  expect([&] { scalar_picture(cv::Mat::ones(2, 4, CV_32FC2), 0, 1); }, "is CV_32FC2");
+  expect([&] { reason_picture(bytes, bytes); }, "map of reasons is CV_8UC1");
+  expect([&] { reason_picture(bits, bytes.colRange(0, 3)); }, "4x2 pixels instead of 3x2");
+  expect([&] { reason_picture(bits, one); }, "image is CV_32FC1");
+  expect([&] { reason_picture(bits, {}); }, "image is empty");
+  expect([&] { with_reason_legend(bytes); }, "picture is CV_8UC1");
+  expect([&] { with_scalar_legend({}, 0, 1); }, "picture is empty");
+  expect([&] { panel_sheet({{"a", bytes}, {"b", one}}, 2); }, "panel b is CV_32FC1");
+  expect([&] { panel_sheet({{"a", {}}}, 2); }, "panel a is empty");
+}
+
+TEST(PointCloud, RefusesWrongMaps) {
+  using ::testing::HasSubstr;
+  const auto make = [](const cv::Mat& distance, const cv::Mat& rays, const cv::Mat& normals,
+                       const cv::Mat& image, const cv::Mat& confidence) {
+    return test::error_of([&] {
+      make_point_cloud(distance, rays, normals, image, confidence, Eigen::Isometry3d::Identity());
+    });
+  };
+  const cv::Mat distance = cv::Mat::ones(2, 4, CV_32FC1), rays = cv::Mat::ones(2, 4, CV_32FC4);
+  EXPECT_EQ(make(distance, rays, {}, {}, {}), "");
+  EXPECT_THAT(make(distance, {}, {}, {}, {}), HasSubstr("map of rays is empty"));
+  EXPECT_THAT(make(distance, distance, {}, {}, {}), HasSubstr("map of rays is CV_32FC1"));
+  EXPECT_THAT(make(distance, rays.colRange(0, 3), {}, {}, {}),
+              HasSubstr("map of rays is 3x2 pixels instead of 4x2"));
+  EXPECT_THAT(make(cv::Mat::ones(2, 4, CV_8UC1), rays, {}, {}, {}),
+              HasSubstr("distance map is CV_8UC1"));
+  EXPECT_THAT(make(distance, rays, distance, {}, {}), HasSubstr("normal map is CV_32FC1"));
+  EXPECT_THAT(make(distance, rays, {}, distance, {}), HasSubstr("image is CV_32FC1"));
+  EXPECT_THAT(make(distance, rays, {}, cv::Mat::ones(2, 3, CV_8UC1), {}),
+              HasSubstr("image is 3x2"));
+  EXPECT_THAT(make(distance, rays, {}, {}, rays), HasSubstr("confidence map is CV_32FC4"));
+}
+
+TEST(PointCloud, PixelsWithoutARayHaveNoPoint) {
+  const cv::Mat distance = cv::Mat::ones(1, 2, CV_32FC1);
+  cv::Mat rays = cv::Mat::zeros(1, 2, CV_32FC4);
+  rays.at<cv::Vec4f>(0, 1) = {0, 0, 1, 1};
+  const PointCloud cloud =
+      make_point_cloud(distance, rays, {}, {}, {}, Eigen::Isometry3d::Identity());
+  ASSERT_EQ(cloud.size(), 1U);
+  EXPECT_EQ(cloud[0].position, Eigen::Vector3f(0, 0, 1));
+}
+
+/// Floats are 1/16 m apart there: a camera rounded to one of them would add as much again.
+TEST(PointCloud, FarPositionsAreRoundedOnce) {
+  const cv::Mat distance(1, 1, CV_32FC1, cv::Scalar(0.04));
+  const cv::Mat rays(1, 1, CV_32FC4, cv::Scalar(1, 0, 0, 1));
+  const PointCloud cloud = make_point_cloud(
+      distance, rays, {}, {}, {}, Eigen::Isometry3d(Eigen::Translation3d(600'000.04, 0, 0)));
+  EXPECT_EQ(cloud[0].position.x(), 600'000.0625F);
 }
 
 TEST(PointCloud, PlacesPointsInTheWorld) {

@@ -134,6 +134,17 @@ TEST_F(Sequences, WhatIsMissingIsNamed) {
   EXPECT_THAT(error({2}), HasSubstr("lists no images"));
 }
 
+/// So many that the last entry, in any order, is hardly the image.
+TEST_F(Sequences, LinksToNothingAreNoImages) {
+  add("cam0/1.png");
+  for (int i = 0; i < 50; ++i) {
+    const std::string number = std::to_string(i);
+    fs::create_symlink("nothing", folder_ / ("cam0/" + number + (i % 2 == 0 ? "x.png" : ".txt")));
+  }
+  EXPECT_EQ(error({0}), "");
+  EXPECT_EQ(names(read_sequence(folder_.path(), {0})), std::vector<std::string>{"1"});
+}
+
 TEST_F(Sequences, FramesOfOneNameAreRefused) {
   add("mav0/cam0/data.csv", "200,000001.png\n300,000001.png\n");
   EXPECT_THAT(error({0}), HasSubstr("Two frames have the name 000001, those of "));
@@ -155,6 +166,9 @@ TEST_F(Sequences, UnreadableFoldersAreNamed) {
   const std::string message = error({0});
   fs::permissions(folder_ / "mav0/cam0", fs::perms::owner_all);
   EXPECT_THAT(message, HasSubstr("mav0/cam0/data.csv: Permission denied; check the permissions"));
+  fs::permissions(folder_ / "mav0/cam0/data", fs::perms::none);
+  EXPECT_THAT(error({0}), HasSubstr("Cannot read the folder"));
+  fs::permissions(folder_ / "mav0/cam0/data", fs::perms::owner_all);
 }
 
 class Trajectories : public Sequences {
@@ -165,15 +179,16 @@ class Trajectories : public Sequences {
   }
 };
 
-TEST_F(Trajectories, AreReadInOrderOfTime) {
+TEST_F(Trajectories, AreReadInTheirOrder) {
   folder_.write("poses.txt",
                 "# timestamp tx ty tz qx qy qz qw\n2.5 1 2 3 0 0 0.70710678 0.70710678\r\n"
                 "\n 1.5 0 0 0 0 0 0 1\n");
   const auto [poses, body] = read_trajectory(folder_ / "poses.txt");
   EXPECT_EQ(body, Body::camera);
   ASSERT_EQ(poses.size(), 2u);
-  EXPECT_EQ(poses[0].seconds, 1.5);
-  const Eigen::Vector3d moved = poses[1].world_from_body * Eigen::Vector3d(1, 0, 0);
+  EXPECT_EQ(poses[0].seconds, 2.5);
+  EXPECT_EQ(poses[1].seconds, 1.5);
+  const Eigen::Vector3d moved = poses[0].world_from_body * Eigen::Vector3d(1, 0, 0);
   EXPECT_LT((moved - Eigen::Vector3d(1, 3, 3)).norm(), 1e-6) << "a quarter turn about z";
 }
 
@@ -309,6 +324,26 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, {}, 0.01, "p"); }),
               HasSubstr("no poses in p"));
+}
+
+TEST_F(Trajectories, BelongToFramesByOrderOnlyWhereSortedByTime) {
+  std::vector<StampedPose> trajectory(3);
+  for (int i = 0; i < 3; ++i) {
+    trajectory[i].seconds = 1 + i;
+    trajectory[i].world_from_body.translation().x() = i;
+  }
+  std::swap(trajectory[1], trajectory[2]);
+  std::vector<SequenceFrame> frames(3);
+  EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, trajectory, 0.01, "p"); }),
+              HasSubstr("p: pose 3 is earlier than the one before it"));
+  for (int i = 0; i < 3; ++i) frames[i].nanoseconds = 1'000'000'000LL * (1 + i);
+  const auto poses = poses_of_frames(frames, {0, 1, 2}, trajectory, 0.01, "p");
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(poses[i].translation().x(), i);
+  for (StampedPose& pose : trajectory) pose.seconds = 0;  // as where nobody knew the times
+  EXPECT_EQ(poses_of_frames(std::vector<SequenceFrame>(3), {1}, trajectory, 0.01, "p")[0]
+                .translation()
+                .x(),
+            2);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "error_of.h"
 #include "widestereo/synthesis.h"
@@ -262,17 +263,61 @@ TEST_F(Fusion, MemoryLimitsChangeTimeOnly) {
   for (std::size_t i = 0; i < once.size(); ++i) EXPECT_EQ(often[i].position, once[i].position);
 }
 
-TEST_F(Fusion, WorksFarFromTheOrigin) {
-  const std::size_t near = fuse_all().size();
-  for (View& view : views_) view.world_from_camera.translation() += Eigen::Vector3d(6e5, 5.7e6, 70);
+TEST_F(Fusion, IsAsPreciseInANationalGridFromALocalOrigin) {
+  const auto near = static_cast<double>(fuse_all().size());
+  const Eigen::Vector3d place(600'012.3, -5'700'099.6, 70.1);
+  for (View& view : views_) view.world_from_camera.translation() += place;
+  const Eigen::Vector3d origin = local_origin(views_.front());
+  EXPECT_EQ(origin, Eigen::Vector3d(600'000, -5'700'000, 0));
+  for (View& view : views_) view.world_from_camera.translation() -= origin;
   const PointCloud cloud = fuse_all();
-  EXPECT_EQ(cloud.size(), near);
-  EXPECT_NEAR(cloud.front().position.y(), 5.7e6, 100);
+  EXPECT_NEAR(static_cast<double>(cloud.size()), near, 0.01 * near);
+  double largest = 0;
+  for (CloudPoint point : cloud) {
+    point.position = (point.position.cast<double>() + origin - place).cast<float>();
+    if (point.position.norm() < 5) largest = std::max(largest, std::abs(from_plane(point)));
+  }
+  EXPECT_LT(largest, 1e-4);
+}
+
+/// Every pixel has a distance, but a lens of half the size has no ray for the corners.
+TEST_F(Fusion, PixelsWithoutARayMakeNoPoints) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    views_[i].camera.fx /= 2;
+    views_[i].camera.fy /= 2;
+    maps_[i].distance.setTo(2);
+  }
+  const cv::Mat rays = ray_image(views_[0].camera, {});
+  ASSERT_EQ(rays.at<cv::Vec4f>(0, 0), cv::Vec4f(0, 0, 0, 0));
+  FusionOptions options;
+  options.min_views = 1;
+  const PointCloud cloud = fuse_all(options);
+  EXPECT_GT(cloud.size(), 1000U);
+  for (const CloudPoint& point : cloud) {
+    ASSERT_TRUE(point.position.allFinite());
+    ASSERT_GT(point.position.norm(), 1);
+  }
 }
 
 TEST_F(Fusion, MapsThatDoNotFitAreNamed) {
   maps_[1].distance = cv::Mat::ones(4, 4, CV_32FC1);
   EXPECT_NE(test::error_of([this] { fuse_all(); }).find(views_[1].name), std::string::npos);
+  const auto expect = [this](cv::Mat ViewMaps::*map, const cv::Mat& wrong,
+                             const std::string& message) {
+    const cv::Mat right = std::exchange(maps_[0].*map, wrong);
+    EXPECT_NE(test::error_of([this] { fuse_all(); }).find(message + " of " + views_[0].name),
+              std::string::npos)
+        << message;
+    maps_[0].*map = right;
+  };
+  maps_[1].distance = maps_[0].distance;
+  expect(&ViewMaps::distance, {}, "The distance map");
+  expect(&ViewMaps::distance, cv::Mat::ones(side, side, CV_64FC1), "The distance map");
+  expect(&ViewMaps::normals, cv::Mat::ones(side, side, CV_64FC3), "The normal map");
+  expect(&ViewMaps::normals, cv::Mat::ones(side, 4, CV_32FC3), "The normal map");
+  expect(&ViewMaps::confidence, cv::Mat::ones(side, side, CV_8UC1), "The confidence map");
+  expect(&ViewMaps::image, cv::Mat::ones(side, side, CV_32FC3), "The image");
+  expect(&ViewMaps::image, cv::Mat::ones(side, 4, CV_8UC3), "The image");
   EXPECT_NE(test::error_of([this] {
               fuse(views_, {{}}, [this](std::size_t i) { return maps_[i]; });
             }).find("3 views"),

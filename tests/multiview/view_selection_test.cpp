@@ -7,6 +7,8 @@
 #include <opencv2/core.hpp>
 #include <set>
 
+#include "error_of.h"
+
 namespace widestereo {
 namespace {
 
@@ -87,6 +89,16 @@ TEST(ViewSelection, CountsObserversOnce) {
   const std::vector<ObservedPoint> points = {
       {{0, 0, 10}, {0, 1, 1, 1}}, {{0, 0, 10}, {2, 0}}, {{0, 0, 10}, {0, 2}}};
   EXPECT_EQ(ViewSelection(centres, points).sources(0, 2), (std::vector<std::size_t>{2, 1}));
+}
+
+TEST(ViewSelection, NumbersOfNoViewAreErrors) {
+  const std::vector<Eigen::Vector3d> centres = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  const std::string asked = test::error_of([&] { (void)ViewSelection(centres, {}).sources(3, 1); });
+  EXPECT_NE(asked.find("no view number 3 among its 3"), std::string::npos) << asked;
+  const std::string observed = test::error_of([&] {
+    (void)ViewSelection(centres, {{{0, 0, 10}, {0, 7}}});
+  });
+  EXPECT_NE(observed.find("no view number 7 among its 3"), std::string::npos) << observed;
 }
 
 }  // namespace

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "widestereo/evaluation.h"
+
+namespace widestereo {
+
+/// Throws Error unless a distance map and what it is scored against are as GroundTruth documents
+/// them.
+void require_truth(const cv::Mat& distance, const GroundTruth& truth);
+
+}  // namespace widestereo
