@@ -145,11 +145,20 @@ void PosedImageSettings::apply_masks(PosedImages& posed) const {
   if (!fs::is_directory(masks)) {
     throw ws::Error(masks + " is no folder; give the one that holds NAME.png for the image NAME.");
   }
+  const auto mask_of = [this](const ws::View& view) {
+    return fs::path(masks) / (view.name + ".png");
+  };
+  bool found = false;
   for (ws::View& view : posed.calibrated) {
-    const fs::path mask = fs::path(masks) / (view.name + ".png");
+    const fs::path mask = mask_of(view);
     if (!fs::exists(mask)) continue;
+    found = true;
     view.mask = ws::read_mask(mask);
     ws::require_calibrated_size(view.mask, view, mask.string());
+  }
+  if (!found && !posed.calibrated.empty()) {
+    throw ws::Error(masks + " holds no mask of any image; there should be " +
+                    mask_of(posed.calibrated.front()).string() + ", for example.");
   }
 }
 

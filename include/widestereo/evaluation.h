@@ -42,6 +42,7 @@ constexpr double edge_normal_step = 20;        ///< degrees
 constexpr double interior_edge_clearance = 8;  ///< pixels
 
 /// Scores over one set of pixels. Shares lie in [0, 1]. A pixel without prediction counts as bad.
+/// Scores of a region; shares, means and medians over no pixel at all are NaN (null in JSON).
 struct RegionScores {
   /// "all", "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg", and where there is an
   /// image "textured" and "textured interior" (textured, and not at an edge of the true scene).
@@ -56,13 +57,13 @@ struct RegionScores {
   /// The same over those of them that have a prediction (and, for displacements, one that projects
   /// into the source).
   std::map<double, double> bad_relative_predicted, bad_pixels_predicted;
-  double median_pixels = 0;         ///< px, the pixels of bad_pixels_predicted
-  double mean_absolute = 0;         ///< metres, predicted pixels
-  double root_mean_square = 0;      ///< metres, predicted pixels
-  double median_absolute = 0;       ///< metres, predicted pixels
-  double median_relative = 0;       ///< share, predicted pixels
-  double mean_normal_angle = -1;    ///< degrees, -1 where there are no normals
-  double median_normal_angle = -1;  ///< degrees
+  double median_pixels = 0;        ///< px, the pixels of bad_pixels_predicted
+  double mean_absolute = 0;        ///< metres, predicted pixels
+  double root_mean_square = 0;     ///< metres, predicted pixels
+  double median_absolute = 0;      ///< metres, predicted pixels
+  double median_relative = 0;      ///< share, predicted pixels
+  double mean_normal_angle = 0;    ///< degrees, pixels with a predicted and a true normal
+  double median_normal_angle = 0;  ///< degrees, likewise
 };
 
 /// Scores `distance` (CV_32FC1, metres along the ray; <= 0 or non-finite = no prediction) of view

@@ -14,6 +14,7 @@
 #include "geometry/angle.h"
 #include "geometry/distance.h"
 #include "geometry/validation.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -122,6 +123,13 @@ cv::Mat interior_pixels(const GroundTruth& truth, const cv::Mat& rays) {
   return clearance >= interior_edge_clearance;
 }
 
+double confidence_at(const cv::Mat& confidence, int x, int y) {
+  const float value = confidence.at<float>(y, x);
+  if (value >= 0 && value <= 1) return static_cast<double>(value);
+  throw Error("The confidence map has " + text_of(value) + " at pixel (" + std::to_string(x) +
+              ", " + std::to_string(y) + "); give one of numbers from 0 to 1.");
+}
+
 std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
                             const cv::Mat& confidence, const GroundTruth& truth,
                             const View& reference, const View& source) {
@@ -142,7 +150,7 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       const Eigen::Vector3d ray = direction(rays.at<cv::Vec4f>(y, x));
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * 180 / std::numbers::pi;
       sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
-      if (!confidence.empty()) sample.confidence = static_cast<double>(confidence.at<float>(y, x));
+      if (!confidence.empty()) sample.confidence = confidence_at(confidence, x, y);
       Eigen::Vector2d expected;
       sample.in_source = source_view.in_image(sample.truth * ray, expected);
       const float d = distance.at<float>(y, x);
@@ -165,8 +173,11 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
 /// project.
 bool is_right(const Sample& sample) { return sample.displacement <= right_pixels; }
 
+/// What no pixel tells.
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
 double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
+  if (values.empty()) return unknown;
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   if (values.size() % 2 == 1) return *middle;
@@ -174,7 +185,7 @@ double median_of(std::vector<double> values) {
 }
 
 double mean_of(const std::vector<double>& values) {
-  if (values.empty()) return 0;
+  if (values.empty()) return unknown;
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
@@ -183,7 +194,7 @@ double share_above(const std::vector<double>& values, double threshold, std::siz
   const auto above = static_cast<std::size_t>(std::count_if(
       values.begin(), values.end(), [threshold](double value) { return value > threshold; }));
   const std::size_t total = values.size() + missing;
-  return total == 0 ? 0 : static_cast<double>(above + missing) / static_cast<double>(total);
+  return total == 0 ? unknown : static_cast<double>(above + missing) / static_cast<double>(total);
 }
 
 RegionScores score(const std::string& region, const std::vector<const Sample*>& samples) {
@@ -194,14 +205,14 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
   std::vector<double> absolute;
   std::vector<double> displacement;
   std::vector<double> angle;
-  double squares = 0;
+  std::vector<double> squares;
   std::size_t in_source = 0;
   for (const Sample* sample : samples) {
     if (sample->in_source) ++in_source;
     if (!sample->predicted) continue;
     absolute.push_back(sample->error);
     relative.push_back(sample->error / sample->truth);
-    squares += sample->error * sample->error;
+    squares.push_back(sample->error * sample->error);
     if (!std::isnan(sample->displacement)) displacement.push_back(sample->displacement);
     if (sample->normal_angle >= 0) angle.push_back(sample->normal_angle);
   }
@@ -222,13 +233,9 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
   scores.mean_absolute = mean_of(absolute);
   scores.median_absolute = median_of(absolute);
   scores.median_relative = median_of(relative);
-  if (!absolute.empty()) {
-    scores.root_mean_square = std::sqrt(squares / static_cast<double>(absolute.size()));
-  }
-  if (!angle.empty()) {
-    scores.mean_normal_angle = mean_of(angle);
-    scores.median_normal_angle = median_of(angle);
-  }
+  scores.root_mean_square = std::sqrt(mean_of(squares));
+  scores.mean_normal_angle = mean_of(angle);
+  scores.median_normal_angle = median_of(angle);
   return scores;
 }
 

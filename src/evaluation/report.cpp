@@ -19,6 +19,12 @@ std::string formatted(const char* format, Values... values) {
   return text;
 }
 
+/// A number of a table, "-" where there is none.
+std::string cell(const char* format, double value) {
+  const std::string text = formatted(format, value);
+  return std::isnan(value) ? std::string(text.size() - 1, ' ') + "-" : text;
+}
+
 nlohmann::ordered_json shares(const std::map<double, double>& bad) {
   nlohmann::ordered_json json;
   for (const auto& [threshold, share] : bad) json[nlohmann::json(threshold).dump()] = share;
@@ -35,13 +41,12 @@ std::string to_table(const std::vector<RegionScores>& scores) {
   for (const RegionScores& s : scores) {
     if (s.pixels == 0) continue;
     table += formatted("%-17s %8ld %5.1f%% |", s.region.c_str(), s.pixels, 100 * s.completeness);
-    for (const auto& [threshold, share] : s.bad_relative)
-      table += formatted(" %5.1f%%", 100 * share);
+    for (const auto& [threshold, share] : s.bad_relative) table += cell(" %5.1f%%", 100 * share);
     table += " |";
-    for (const auto& [threshold, share] : s.bad_pixels) table += formatted(" %5.1f%%", 100 * share);
-    table += formatted(" | %7.3f %7.3f %7.4f %7.4f |", s.median_pixels, 100 * s.median_relative,
-                       s.mean_absolute, s.root_mean_square);
-    if (s.mean_normal_angle >= 0) {
+    for (const auto& [threshold, share] : s.bad_pixels) table += cell(" %5.1f%%", 100 * share);
+    table += " |" + cell(" %7.3f", s.median_pixels) + cell(" %7.3f", 100 * s.median_relative) +
+             cell(" %7.4f", s.mean_absolute) + cell(" %7.4f", s.root_mean_square) + " |";
+    if (!std::isnan(s.mean_normal_angle)) {
       table += formatted(" %5.1f %5.1f", s.median_normal_angle, s.mean_normal_angle);
     }
     table += "\n";

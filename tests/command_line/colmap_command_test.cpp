@@ -282,6 +282,10 @@ TEST_F(ReconstructCommand, MasksAreOfEachImage) {
 
 TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   expect_error(reconstruct() + "--masks " + file("none"), "none is no folder");
+  std::filesystem::create_directories(folder_ / "others");
+  cv::imwrite(file("others/left.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  expect_error(reconstruct() + "--masks " + file("others"),
+               "holds no mask of any image; there should be " + file("others/"));
   const std::string mask = " --mask " + file("left.png");
   expect_error(reconstruct() + mask + mask, "--mask is for all images");
   EXPECT_NE(run(reconstruct() + "--sources 0").exit_code, 0);

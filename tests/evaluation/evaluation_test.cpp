@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
@@ -61,7 +63,7 @@ TEST_F(FourPixels, EveryFigureIsAsCountedByHand) {
   EXPECT_DOUBLE_EQ(all.bad_pixels.at(0.5), 0.75);
   EXPECT_DOUBLE_EQ(all.bad_pixels.at(1), 0.5);
   EXPECT_NEAR(all.bad_pixels_predicted.at(1), 1 / 3.0, 1e-12);
-  EXPECT_EQ(all.mean_normal_angle, -1);
+  EXPECT_TRUE(std::isnan(all.mean_normal_angle));
   EXPECT_EQ(scores[2].pixels, 4) << "all within 30 degrees";
   EXPECT_EQ(scores[5].pixels, 0);
 }
@@ -320,6 +322,31 @@ TEST_F(TexturedScene, LowCostIsAlsoCountedWhereThereIsTexture) {
   EXPECT_EQ(without.textured, 0);
   EXPECT_EQ(without.low_cost_textured, 0);
   EXPECT_EQ(without.low_cost, s.low_cost);
+}
+
+TEST_F(FourPixels, WhatNoPixelTellsIsUnknown) {
+  const cv::Mat nothing = cv::Mat::zeros(2, 4, CV_32FC1);
+  const std::vector<RegionScores> scores = evaluate(nothing, {}, truth_, reference_, source_);
+  EXPECT_EQ(scores[0].completeness, 0);
+  EXPECT_EQ(scores[0].bad_relative.at(0.02), 1);
+  for (const double score :
+       {scores[0].median_pixels, scores[0].median_relative, scores[0].mean_absolute,
+        scores[0].root_mean_square, scores[0].bad_relative_predicted.at(0.02)}) {
+    EXPECT_TRUE(std::isnan(score)) << score;
+  }
+  EXPECT_TRUE(nlohmann::json::parse(to_json(scores))[0]["mean_absolute"].is_null());
+  EXPECT_EQ(to_table(scores).find("nan"), std::string::npos) << to_table(scores);
+}
+
+TEST_F(FourPixels, ConfidencesAreProbabilities) {
+  const cv::Mat distance(2, 4, CV_32FC1, cv::Scalar(2));
+  for (const float wrong : {1.5F, -0.1F, std::numeric_limits<float>::quiet_NaN()}) {
+    const cv::Mat confidence(2, 4, CV_32FC1, cv::Scalar(wrong));
+    const std::string error =
+        test::error_of([&] { sparsification(distance, confidence, truth_, reference_, source_); });
+    EXPECT_NE(error.find("at pixel (0, 0); give one of numbers from 0 to 1"), std::string::npos)
+        << error;
+  }
 }
 
 TEST(Evaluation, SparsificationFallsWhenConfidenceIsRight) {
