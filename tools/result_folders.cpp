@@ -17,6 +17,7 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 constexpr const char* unfinished = ".unfinished";
+constexpr const char* removed = ".removed";
 
 /// The first setting (of objects) that differs, as "NAME is A there and B now"; empty if none does.
 std::string first_difference(const Json& there, const Json& now) {
@@ -67,7 +68,7 @@ ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, b
   lock_.emplace(folder_);
   read(settings, overwrite);
   std::error_code ignored;
-  fs::remove_all(folder_ / unfinished, ignored);
+  for (const char* left : {unfinished, removed}) fs::remove_all(folder_ / left, ignored);
 }
 
 bool ResultFolders::is_record_of_result(const Json& record) const {
@@ -131,8 +132,10 @@ void ResultFolders::remove(const std::string& name) const {
     throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +
                     "; choose another folder, or remove it.");
   }
+  // Whenever the run ends, a result is there as a whole or not at all.
   std::error_code error;
-  fs::remove_all(path, error);
+  fs::rename(path, folder_ / removed, error);
+  if (!error) fs::remove_all(folder_ / removed, error);
   if (error) throw ws::Error("Cannot remove " + path.string() + ": " + error.message() + ".");
 }
 

@@ -157,8 +157,11 @@ TEST_F(SequenceCommand, OverwritingBeginsWithTheFirstNewFrame) {
   EXPECT_EQ(run(sequence() + "--overwrite --levels 4").exit_code, 1);
   EXPECT_TRUE(bytes_of(folder_ / "out/sequence.json") == before);
   EXPECT_TRUE(fs::exists(folder_ / "out/001/distance0.tiff"));
+  // Of a run that was killed while it removed a frame.
+  fs::create_directories(folder_ / "out/.removed/maps");
   ASSERT_EQ(run(sequence() + "--overwrite --seed 5 --count 1").exit_code, 0);
   EXPECT_FALSE(fs::exists(folder_ / "out/001"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/.removed"));
 }
 
 TEST_F(SequenceCommand, TwoRunsNeedTwoFolders) {
