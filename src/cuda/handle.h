@@ -16,23 +16,48 @@
 namespace widestereo {
 
 /// Makes a device current in this thread for a scope; -1 leaves whichever is current.
-class CurrentDevice {
+class SelectedDevice {
  public:
-  CurrentDevice(int ordinal, const std::string& name) {
+  SelectedDevice(int ordinal, const std::string& name) {
     if (ordinal < 0) return;
     check(cudaGetDevice(&previous_), name, "be found by the CUDA runtime");
     if (previous_ != ordinal) check(cudaSetDevice(ordinal), name, "be made current");
     changed_ = previous_ != ordinal;
   }
-  ~CurrentDevice() {
+  ~SelectedDevice() {
     if (changed_) cudaSetDevice(previous_);
   }
-  CurrentDevice(const CurrentDevice&) = delete;
-  CurrentDevice& operator=(const CurrentDevice&) = delete;
+  SelectedDevice(const SelectedDevice&) = delete;
+  SelectedDevice& operator=(const SelectedDevice&) = delete;
 
  private:
   int previous_ = 0;
   bool changed_ = false;
+};
+
+/// Lets this thread allocate and free for a scope while another one captures, which the default
+/// mode of captures forbids. What is called on no capturing stream does not disturb them.
+class RelaxedCaptures {
+ public:
+  explicit RelaxedCaptures(const std::string& name) {
+    check(cudaThreadExchangeStreamCaptureMode(&mode_), name, "work while others capture");
+  }
+  ~RelaxedCaptures() { cudaThreadExchangeStreamCaptureMode(&mode_); }
+  RelaxedCaptures(const RelaxedCaptures&) = delete;
+  RelaxedCaptures& operator=(const RelaxedCaptures&) = delete;
+
+ private:
+  cudaStreamCaptureMode mode_ = cudaStreamCaptureModeRelaxed;
+};
+
+/// What all work on a device needs of this thread, for a scope; -1: on whichever is current.
+class CurrentDevice {
+ public:
+  CurrentDevice(int ordinal, const std::string& name) : device_(ordinal, name), captures_(name) {}
+
+ private:
+  SelectedDevice device_;
+  RelaxedCaptures captures_;  // then: a first call may make a context on the current device
 };
 
 template <auto destroy>

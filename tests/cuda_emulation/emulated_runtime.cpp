@@ -36,6 +36,7 @@ struct CUstream_st {
   bool blocking = true;
   CUgraph_st* capturing = nullptr;
   std::thread::id capturing_thread;
+  cudaStreamCaptureMode mode = cudaStreamCaptureModeGlobal;  // of that capture
 };
 struct CUevent_st {
   CUstream_st* stream = nullptr;  // of the last record or of the launch of the graph with it
@@ -83,6 +84,13 @@ bool this_thread_captures() {
     return stream.capturing_thread == std::this_thread::get_id();
   });
 }
+thread_local cudaStreamCaptureMode mode_of_thread = cudaStreamCaptureModeGlobal;
+/// Of other threads: the real runtime refuses allocations and the like then, unless told otherwise.
+bool captures_forbid_this_thread() {
+  return mode_of_thread == cudaStreamCaptureModeGlobal &&
+         any_capture(
+             [](const CUstream_st& stream) { return stream.mode == cudaStreamCaptureModeGlobal; });
+}
 /// Streams that wait for the default stream must not capture while it is used.
 bool a_blocking_stream_captures() {
   return any_capture([](const CUstream_st& stream) { return stream.blocking; });
@@ -96,9 +104,11 @@ cudaError_t step() {
       e.failing_call >= 0 && (call == e.failing_call || (e.sticky && call > e.failing_call));
   return fails ? e.failure : cudaSuccess;
 }
-/// Likewise, of one that must not be made while this thread captures.
+/// Likewise, of one that must not be made while this thread captures, in whichever mode: the back
+/// end does nothing but launch then.
 cudaError_t step_outside_capture() {
-  return this_thread_captures() ? cudaErrorStreamCaptureUnsupported : step();
+  return this_thread_captures() || captures_forbid_this_thread() ? cudaErrorStreamCaptureUnsupported
+                                                                 : step();
 }
 /// Likewise, of one that uses the default stream.
 cudaError_t step_on(cudaStream_t stream) {
@@ -283,9 +293,6 @@ cudaError_t cudaFree(void* memory) {
   std::free(memory);
   return cudaSuccess;
 }
-cudaError_t cudaMemset(void* memory, int value, std::size_t bytes) {
-  return cudaMemsetAsync(memory, value, bytes, nullptr);
-}
 cudaError_t cudaMemsetAsync(void* memory, int value, std::size_t bytes, cudaStream_t stream) {
   if (const cudaError_t error = step_on(stream)) return error;
   enqueue(stream, [=] { std::memset(memory, value, bytes); });
@@ -319,10 +326,6 @@ cudaError_t cudaMemcpy2D(void* to, std::size_t to_pitch, const void* from, std::
       cudaMemcpy2DAsync(to, to_pitch, from, from_pitch, width, height, kind, nullptr);
   run_all(default_stream());
   return error;
-}
-
-cudaError_t cudaMemcpy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {
-  return cudaMemcpy2D(to, bytes, from, bytes, bytes, 1, kind);
 }
 
 cudaChannelFormatDesc cudaCreateChannelDesc(int x, int y, int z, int w,
@@ -380,11 +383,16 @@ cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
   run_all(*resolve(stream));
   return cudaSuccess;
 }
-cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
+cudaError_t cudaThreadExchangeStreamCaptureMode(cudaStreamCaptureMode* mode) {
+  std::swap(*mode, mode_of_thread);
+  return cudaSuccess;
+}
+cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode mode) {
   if (stream == nullptr || stream->capturing != nullptr) return cudaErrorInvalidValue;
   if (const cudaError_t error = step()) return error;
   stream->capturing = new CUgraph_st;
   stream->capturing_thread = std::this_thread::get_id();
+  stream->mode = mode;
   ++emulation().live_objects;
   return cudaSuccess;
 }
