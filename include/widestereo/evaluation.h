@@ -41,8 +41,8 @@ constexpr double edge_distance_step = 0.05;
 constexpr double edge_normal_step = 20;        ///< degrees
 constexpr double interior_edge_clearance = 8;  ///< pixels
 
-/// Scores over one set of pixels. Shares lie in [0, 1]. A pixel without prediction counts as bad.
-/// Scores of a region; shares, means and medians over no pixel at all are NaN (null in JSON).
+/// Scores over one set of pixels. Shares lie in [0, 1]; a pixel without prediction counts as bad.
+/// Shares, means and medians over no pixel at all are NaN (null in JSON).
 struct RegionScores {
   /// "all", "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg", and where there is an
   /// image "textured" and "textured interior" (textured, and not at an edge of the true scene).

@@ -64,8 +64,7 @@ std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
 
 /// The poses of the chosen ones among all frames (by index): the one nearest in time, within
 /// `tolerance` seconds, where frames have times; else in their order, where there are as many and
-/// their times do not go back.
-/// Throws Error otherwise; `name` (of the file) begins the message.
+/// their times do not go back. Throws Error otherwise; `name` (of the file) begins the message.
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
                                                const std::vector<std::size_t>& chosen,
                                                std::vector<StampedPose> trajectory,

@@ -18,8 +18,8 @@ struct ObservedPoint {
 
 /// Points that stand for a scene of which nothing is known but how far it reaches: on a grid of
 /// rays of each view, at distances (metres) from `nearest` to `farthest` that grow by equal
-/// factors, with all views that they project into. What hides them is not known. Cameras
-/// must be valid (validate()) and 0 < nearest <= farthest, which is not checked.
+/// factors, with all views that they project into. What hides them is not known. Cameras must be
+/// valid (validate()) and 0 < nearest <= farthest, which is not checked.
 std::vector<ObservedPoint> assumed_points(const std::vector<View>& views, double nearest,
                                           double farthest);
 

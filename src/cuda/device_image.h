@@ -13,8 +13,8 @@ namespace widestereo {
 class DeviceImage {
  public:
   DeviceImage() = default;
-  /// `size`: with the aprons of this many pixels on every side. Throws Error naming the device. The
-  /// memory may be filled after the constructor returns, on the default stream.
+  /// `size`: with the aprons of this many pixels on every side. Waits for the stream, which fills
+  /// it. Throws Error naming the device.
   DeviceImage(cv::Size size, int apron, cudaStream_t stream, const std::string& device);
 
   /// Of pixel (0, 0).

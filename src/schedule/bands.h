@@ -18,12 +18,12 @@ struct Band {
   long long work = 0;     ///< with what else it does at most, in samples that take as long
 };
 
-/// Bands of at most `max_work` (but at least one row) in the schedule's order. They point
-/// into `schedule`. The bands of one dispatch do not depend on each other.
+/// Bands of at most `max_work` (but at least one row) in the schedule's order. They point into
+/// `schedule`. The bands of one dispatch do not depend on each other.
 std::vector<Band> split_into_bands(const Schedule& schedule, long long max_work);
 
-/// Groups consecutive bands for submission: at most `max_work` (but at least one band) and
-/// at most `max_bands` bands in each.
+/// Groups consecutive bands for submission: at most `max_work` (but at least one band) and at most
+/// `max_bands` bands in each.
 std::vector<std::span<const Band>> group_for_submission(std::span<const Band> bands,
                                                         long long max_work, std::size_t max_bands);
 

@@ -18,7 +18,8 @@ DeviceInfo describe(const InstanceFunctions& vk, VkPhysicalDevice device, int in
 /// The device's reason for being unusable in one sentence, empty if it can run the kernels.
 std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device);
 
-/// First queue family that computes, preferably one that can also measure time.
+/// First queue family that computes: of those that measure time, or else of all, preferably one
+/// that does not draw, whose work would wait.
 std::optional<std::uint32_t> compute_queue_family(const InstanceFunctions& vk,
                                                   VkPhysicalDevice device);
 
