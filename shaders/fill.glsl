@@ -6,6 +6,8 @@
 #define FAR_SHARE 0.25f
 // Displacement (source pixels) up to which planes belong to one surface.
 #define SURFACE_DISPLACEMENT 1.0f
+// How much worse than the pixel's own a plane may match that takes its place.
+#define LARGEST_EXTRA_COST 0.1f
 
 // Stores as prior (m, 1) the plane that the pixel would take over, zero where there is none: the median of the
 // surface at the FAR_SHARE of the planes around, both weighted by likeness of intensity.
@@ -71,14 +73,18 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_prior(CONTEXT REFERENCE, pixel, prior);
 }
 
-// Takes the plane over, with the cost of no information where the source does not see it, and marks the pixel.
+// Takes the plane over, with the cost of no information where the source does not see it, and marks the pixel. With
+// FILL_WITH_MATCHES a pixel that agrees with another view keeps its own plane where that matches better: it is seen
+// there, and thin surfaces are rejected for reasons of their neighbours.
 FN void adopt_fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   if (prior.w == 0.0f) return;
   vec3 m = vec3(prior.x, prior.y, prior.z);
-  store_hypothesis(CONTEXT REFERENCE, pixel,
-                   vec4(m, min(patch_cost(CONTEXT pixel, m), NO_INFORMATION_COST)));
+  float cost = min(patch_cost(CONTEXT pixel, m), NO_INFORMATION_COST);
   vec4 checked = check_at(CONTEXT REFERENCE, pixel);
+  bool agrees = (PASS.candidates & FILL_WITH_MATCHES) != 0u && checked.y <= PARAMETERS.check_limits.y;
+  if (agrees && cost > hypothesis_at(CONTEXT REFERENCE, pixel).w + LARGEST_EXTRA_COST) return;
+  store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, cost));
   store_check(CONTEXT REFERENCE, pixel,
               vec4(checked.x, checked.y, 0.0f, checked.w + float(REASON_FILLED)));
 }

@@ -71,10 +71,12 @@
 #define CANDIDATE_SURROUNDINGS 12
 #define CANDIDATE_SOURCE_PLANE 13
 
-// Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane() and adopt_pixel().
+// Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane(), adopt_pixel() and
+// adopt_fill_pixel(), where it stands beside the reasons.
 #define INTERPOLATE_CUBIC 1u
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
+#define FILL_WITH_MATCHES 2048u
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
 // before it half the next one; those for normals alone, over an eighth, twice a half, and the whole radius; the smallest
@@ -120,7 +122,8 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last, which a view that is lower than others does not reach
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
-                    // regression: REGRESS_NORMALS; adopting: HELD_UNSEEN; filling: reasons not to fill
+                    // regression: REGRESS_NORMALS; adopting: HELD_UNSEEN; filling: reasons not to fill,
+                    // FILL_WITH_MATCHES
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels

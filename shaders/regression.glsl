@@ -4,22 +4,35 @@
 
 // Squared change of the slopes, in units of the first round's variance, that a larger neighbourhood may make.
 #define LARGEST_SLOPE_CHANGE 6.0f
+// Squared displacement that a larger neighbourhood may make: in any case (px^2), and in units of the smaller one's
+// variance, which is too small by the pixels of a patch, as neighbours share most of theirs.
+#define SMALLEST_SQUARED_MOVE 0.25f
+#define LARGEST_SQUARED_MOVE 300.0f
 
-// The plane of the smallest neighbourhood that determines its offset to PASS.deviation. With REGRESS_NORMALS
-// the whole neighbourhood gives the slopes.
+// The plane of the smallest neighbourhood that determines its offset to PASS.deviation, or of the largest that does not
+// contradict the one before: a thin surface never determines its own, and what is behind it would outvote it. With
+// REGRESS_NORMALS the whole neighbourhood gives the slopes, likewise.
 FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
                       INOUT(LocalPlane) plane) {
   bool normals = (PASS.candidates & REGRESS_NORMALS) != 0u;
   bool determined = false;
   bool found = false;
   float offset = plane.offset;
+  float certainty = 0.0f;
   for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
     // What has its offset needs but one more round for its slopes.
     if (determined && round < REGRESSION_ROUNDS - 1) continue;
     int radius = PASS.radius >> max(WHOLE_RADIUS_ROUND - round, 0);
     PlaneFit fit;
     if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
+    float move = fit.plane.offset - offset;
+    float squared_move = move * move;
+    if (found && squared_move * certainty > LARGEST_SQUARED_MOVE &&
+        squared_move * own.y * own.y > SMALLEST_SQUARED_MOVE) {
+      break;
+    }
     plane = fit.plane;
+    certainty = fit.certainty;
     found = true;
     if (!determined) offset = plane.offset;
     if (fit.certainty * PASS.deviation * PASS.deviation > own.y * own.y) determined = true;

@@ -465,21 +465,22 @@ class Builder {
     add(Kernel::ambiguity, pass, views_of(0), pass.places);
   }
 
-  /// All views must have been checked: filled planes must not count as a source's own.
-  void fill(int radius, unsigned reasons_not_to_fill) {
+  /// All views must have been checked: filled planes must not count as a source's own. `how`:
+  /// reasons not to fill, FILL_WITH_MATCHES.
+  void fill(int radius, unsigned how) {
     if (radius == 0) return;
     kernel::PassParameters pass = pass_of(views_of(0));
     pass.radius = radius;
-    pass.candidates = reasons_not_to_fill;
+    pass.candidates = how;
     add(Kernel::fill, pass, views_of(0), 0);
     add(Kernel::adopt_fill, pass, views_of(0), 1);
   }
 
-  /// Lets pixels that fail the checks try the planes around them.
+  /// Lets pixels that fail the checks take the planes around them.
   void repair() {
     if (options_.repair_radius == 0) return;
     check();
-    fill(options_.repair_radius, reason_no_ray | reason_no_overlap);
+    fill(options_.repair_radius, reason_no_ray | reason_no_overlap | FILL_WITH_MATCHES);
   }
 
   const Options& options_;

@@ -366,6 +366,30 @@ TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
   EXPECT_EQ(static_cast<int>(fill({47, 48})[3]), REASON_HIGH_COST) << "too far away";
 }
 
+TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
+  Options options = wide_range();
+  AgreeingViews views(options);
+  KernelFixture& fixture = views.fixture;
+  const ivec2 pixel(48, 48);
+  const vec3 m = views.plane(0);
+  const auto is_filled = [&](unsigned how, float cost, float displacement) {
+    fixture.view(0).hypotheses(pixel.y, pixel.x) = cv::Vec4f(2 * m.x, 2 * m.y, 2 * m.z, cost);
+    fixture.view(0).priors(pixel.y, pixel.x) = cv::Vec4f(m.x, m.y, m.z, 1);
+    fixture.view(0).checks(pixel.y, pixel.x) =
+        cv::Vec4f(0.1f, displacement, 0.5f, REASON_INCONSISTENT);
+    fixture.pass().candidates = how;
+    kernel::cpu::adopt_fill_pixel(fixture.context(), pixel);
+    return fixture.view(0).hypotheses(pixel.y, pixel.x)[2] == m.z;
+  };
+  const float beyond = static_cast<float>(options.consistency_pixels) + 0.5f;
+  // Unrelated images: the plane that is offered matches badly.
+  EXPECT_FALSE(is_filled(FILL_WITH_MATCHES, 0.3f, 0.5f));
+  EXPECT_EQ(static_cast<int>(fixture.view(0).checks(pixel.y, pixel.x)[3]), REASON_INCONSISTENT);
+  EXPECT_TRUE(is_filled(FILL_WITH_MATCHES, 1.9f, 0.5f)) << "as bad a match as any";
+  EXPECT_TRUE(is_filled(FILL_WITH_MATCHES, 0.3f, beyond)) << "perhaps occluded";
+  EXPECT_TRUE(is_filled(0, 0.3f, 0.5f)) << "rejected for good";
+}
+
 TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   Options options = wide_range();
   options.far_preference = 0.02;
