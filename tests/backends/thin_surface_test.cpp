@@ -58,7 +58,7 @@ TEST(ThinSurfaces, StayBeforeAWall) {
     }
   }
   ASSERT_GT(pixels, 500);
-  EXPECT_LT(lost, 0.12 * pixels);
+  EXPECT_LT(lost, 0.12 * pixels) << "of " << pixels;
 }
 
 }  // namespace
