@@ -98,14 +98,16 @@ struct Options {
   /// Intensity scale of the regression's weights, grey levels, 0.1..10000.
   double regression_scale = 12;
   /// A neighbourhood of an eighth, a quarter or half the radius is taken where it determines the
-  /// plane to this standard deviation (source pixels, nominal: neighbours count as independent);
-  /// 1e-6..1000. Each further round of a level asks for 0.6 of the one before.
+  /// plane to this standard deviation (source pixels, nominal: neighbours count as independent), or
+  /// where the next larger one contradicts it; 1e-6..1000. Each further round of a level asks for
+  /// 0.6 of the one before.
   double regression_precision = 0.021;
   /// The first regression of a level averages what neighbours' patches match best, to sub-pixel
   /// accuracy by least squares, instead of where the search has left them.
   bool subpixel_match = true;
   /// After each regression at full size, pixels that fail the checks take the plane of accepted
-  /// ones up to this many pixels away, 0..10000; 0 = none do.
+  /// ones up to this many pixels away, 0..10000; 0 = none do. Those that agree with another view to
+  /// consistency_pixels take it only where it matches about as well as their own.
   int repair_radius = 32;
   /// After that, every pixel takes the plane, of those around, for which the planes up to this many
   /// pixels away and likeness of intensity in the other view speak most, 0..64; 0 = it keeps its
