@@ -75,7 +75,7 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 
 // Takes the plane over, with the cost of no information where the source does not see it, and marks the pixel. With
 // FILL_WITH_MATCHES a pixel that agrees with another view keeps its own plane where that matches better: it is seen
-// there, and thin surfaces are rejected for reasons of their neighbours.
+// there, and what it was rejected for may be a fraction of a pixel, as of thin surfaces far away.
 FN void adopt_fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   if (prior.w == 0.0f) return;

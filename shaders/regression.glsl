@@ -18,7 +18,7 @@ FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 so
   bool determined = false;
   bool found = false;
   float offset = plane.offset;
-  float certainty = 0.0f;
+  float certainty = 0.0f;  // nothing is contradicted yet
   for (int round = 0; round < REGRESSION_ROUNDS; ++round) {
     // What has its offset needs but one more round for its slopes.
     if (determined && round < REGRESSION_ROUNDS - 1) continue;
@@ -27,10 +27,7 @@ FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 so
     if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
     float move = fit.plane.offset - offset;
     float squared_move = move * move;
-    if (found && squared_move * certainty > LARGEST_SQUARED_MOVE &&
-        squared_move * own.y * own.y > SMALLEST_SQUARED_MOVE) {
-      break;
-    }
+    if (squared_move * certainty > LARGEST_SQUARED_MOVE && squared_move * own.y * own.y > SMALLEST_SQUARED_MOVE) break;
     plane = fit.plane;
     certainty = fit.certainty;
     found = true;
