@@ -3,6 +3,11 @@
 
 // Variance (px^2) below which no measurement is believed.
 #define SMALLEST_VARIANCE 4e-4f
+// Of what the match leaves unexplained: the square of the slopes that noise alone makes, and somewhat less, as at edges
+// of surfaces more than noise is unexplained.
+#define NOISE_OF_SLOPES 0.25f
+// Share of a patch's information that is believed in any case.
+#define LEAST_SHARE 0.05f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
 
@@ -41,8 +46,9 @@ FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity,
 
 // Stores all that regress_pixel() needs of a neighbour: the variance of its match along the epipolar curve (px^2), the
 // speed there (pixels per unit of inverse distance), its inverse distance and intensity. The variance is that of the
-// patch's residual over the information of its gradients, and the square of half the displacement from the
-// source's own plane, which exposes what the patch itself cannot tell.
+// patch's residual over the information of its gradients, net of what gain and offset of the intensities explain, too,
+// and of noise, and the square of half the displacement from the source's own plane, which exposes what the patch itself
+// cannot tell.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
@@ -64,6 +70,8 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float n = 0.0f;
     float sum = 0.0f;
     float sum_squares = 0.0f;
+    float sum_slopes = 0.0f;
+    float sum_products = 0.0f;
     for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
       for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
@@ -76,12 +84,19 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         n += weight;
         sum += weight * a;
         sum_squares += weight * a * a;
+        sum_slopes += weight * slope;
+        sum_products += weight * a * slope;
       }
     }
+    float least = LEAST_SHARE * information;
+    float per_sample = n > 0.0f ? 1.0f / n : 0.0f;
+    float spread = max((sum_squares - per_sample * sum * sum) * per_sample, 0.0f);
+    float residual = spread * held.w * (2.0f - held.w) + 1e-7f;
+    float along_gain = sum_products - per_sample * sum * sum_slopes;
+    information -= per_sample * (sum_slopes * sum_slopes + along_gain * along_gain / max(spread, 1e-9f));
+    information = max(information - NOISE_OF_SLOPES * n * residual, least);
     // The checkerboard leaves out every other pixel, whose information is about the same.
     information *= float(COLUMN_STEP) * correlation * correlation;
-    float spread = n > 0.0f ? max(sum_squares / n - sum * sum / (n * n), 0.0f) : 0.0f;
-    float residual = spread * held.w * (2.0f - held.w) + 1e-7f;
     if (speed > 0.0f && information > 0.0f) {
       vec2 difference = difference_from_source(CONTEXT source, pixel, ray, m);
       float displacement = difference.y < UNKNOWN_DIFFERENCE ? min(difference.y, LARGEST_DISPLACEMENT)

@@ -71,8 +71,8 @@ FN vec3 perturbed_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float sc
   return plane_through(ray, distance, normal_from_angles(theta, phi));
 }
 
-// What a plane at inverse distance w must do better by: decides where nothing else does, so that sky is far.
-// Saturates at a few per cent of the range, and so does not pull at planes nearer than that.
+// Share of its cost by which a plane at inverse distance w must do better: decides where nothing else does, so that sky
+// is far. Saturates at a few per cent of the range, and so does not pull at planes nearer than that.
 FN float nearness_penalty(CONTEXT_ARGUMENT float w) {
   vec4 range = PARAMETERS.range;
   float nearness = max(w - range.z, 0.0f) / (SATURATED_SHARE * (range.w - range.z));
@@ -80,7 +80,8 @@ FN float nearness_penalty(CONTEXT_ARGUMENT float w) {
 }
 
 // The better of the held hypothesis (m, cost) and a candidate. `small`: difference of inverse distance up to which
-// the farther of the two is not preferred, which would pull at planes that are matched.
+// the farther of the two is not preferred, which would pull at planes that are matched. The preference is in proportion
+// to the held cost: on a wall's gradient of brightness all planes match well, and a little better means much.
 FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m, float small) {
   bool same = m.x == held.x && m.y == held.y && m.z == held.z;
   if (same || !admissible(CONTEXT ray, m)) return held;
@@ -89,7 +90,9 @@ FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m, flo
   float w = dot(m, ray);
   float w_held = inverse_distance_of(held, ray);
   float handicap = 0.0f;
-  if (abs(w - w_held) > small) handicap = nearness_penalty(CONTEXT w) - nearness_penalty(CONTEXT w_held);
+  if (abs(w - w_held) > small) {
+    handicap = min(held.w, NO_INFORMATION_COST) * (nearness_penalty(CONTEXT w) - nearness_penalty(CONTEXT w_held));
+  }
   if (cost + handicap < held.w) return vec4(m, cost);
   return held;
 }

@@ -90,7 +90,7 @@ struct Options {
   int levels = 3;        ///< each half the size of the finer one, 1..4
   int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
   /// Coarsest level first, one for each level, 0..1000.
-  std::vector<int> level_iterations = {3, 2, 1};
+  std::vector<int> level_iterations = {2, 2, 2};
   std::vector<int> level_regressions = {1, 1, 3};  ///< rounds of plane regression, likewise
   int regression_radius = 40;  ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
                                ///< normals alone four times that
@@ -113,8 +113,8 @@ struct Options {
   /// pixels away and likeness of intensity in the other view speak most, 0..64; 0 = it keeps its
   /// own.
   int vote_radius = 10;
-  /// How much better (cost) the nearest planes must match than the farthest, so that surfaces
-  /// without texture and sky come out as far, 0..2.
+  /// Share of its cost by which the nearest planes must match better than the farthest, so that sky
+  /// comes out as far, 0..1.
   double far_preference = 0;
   double step_pixels = 1;     ///< first perturbation, source pixels, 0..1000; halved each iteration
   double step_normal = 0.5;   ///< first perturbation of a unit normal, at the coarsest level only,

@@ -58,12 +58,11 @@ inline constexpr int pyramid_window_radius = 4;
 KernelTable generic_kernels();
 /// The kernels that take most of the time, with filtering by the texture units, compiled for the
 /// window and the constants of a preset: `paper` (exact warp, dense), the same with the affine
-/// warp, `fast` (affine, checkerboard, weighted) or `quality` (affine, dense, weighted).
+/// warp, or `fast` and `quality` (affine, checkerboard, weighted).
 /// `camera_model`: a camera model that has kernels of its own (kannala_brandt, double_sphere),
 /// anything else selects those for all models.
 KernelTable paper_kernels(int camera_model);
 KernelTable affine_paper_kernels(int camera_model);
-KernelTable fast_kernels(int camera_model);
-KernelTable quality_kernels(int camera_model);
+KernelTable pyramid_kernels(int camera_model);
 
 }  // namespace widestereo::kernel::cuda

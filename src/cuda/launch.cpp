@@ -28,9 +28,7 @@ KernelTable specialised_kernels(const KernelConstants& c) {
   if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, false))
     return affine_paper_kernels(c.camera_model);
   if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
-    return fast_kernels(c.camera_model);
-  if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::dense, true))
-    return quality_kernels(c.camera_model);
+    return pyramid_kernels(c.camera_model);
   return {nullptr, 0};
 }
 

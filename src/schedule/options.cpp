@@ -52,19 +52,17 @@ Options Options::preset_named(const std::string& name) {
   options.weight_scale = 12;
   options.min_texture = 0;
   options.max_cost = 0.8;
-  options.far_preference = 0.02;
+  options.far_preference = 0.08;
   options.warm_iterations = 1;
+  options.pattern = PatchPattern::checkerboard;
   if (name == "fast") {
-    options.pattern = PatchPattern::checkerboard;
     options.sweep_steps = 16;
-    options.level_iterations = {2, 2, 2};
     options.source_planes = false;
     return options;
   }
   if (name == "quality") {
     options.sweep_steps = 128;
-    options.level_iterations = {4, 3, 2};
-    options.regression_radius = 64;
+    options.regression_radius = 48;
     options.regression_steps = 8;
     options.ambiguity_margin = 0.2;
     return options;
@@ -118,7 +116,7 @@ void validate(const Options& o) {
   require_between(o.max_tilt, 0, 90, "max tilt");
   require_between(o.min_support, 0, 1, "min support");
   require_between(o.ambiguity_margin, 0, 2, "ambiguity margin");
-  require_between(o.far_preference, 0, 2, "far preference");
+  require_between(o.far_preference, 0, 1, "far preference");
   require_between(o.vote_radius, 0, 64, "vote radius");
   require_between(o.repair_radius, 0, 10000, "repair radius");
   require_between(o.fill_radius, 0, 10000, "fill radius");

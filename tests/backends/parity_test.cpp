@@ -567,8 +567,9 @@ TEST_P(EveryDevice, BelievesTheSourceThatTellsMost) {
         .median_relative;
   };
   const double of_pair = median_error(pair.rig, images_of(pair));
+  // 1.8 times as much when the first source is believed.
   EXPECT_LT(median_error(rig, {pair.views[0].image, moved.views[0].image, pair.views[1].image}),
-            1.1 * of_pair);
+            1.2 * of_pair);
   expect_no_validation_messages(*device);
 }
 

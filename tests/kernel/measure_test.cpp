@@ -66,6 +66,23 @@ class Measure : public ::testing::Test {
     return all;
   }
 
+  /// Median of the variances of planes held on the wall (px^2), over the middle of the image,
+  /// without what the source adds, which holds no planes to agree with.
+  double median_variance() {
+    std::vector<float> all;
+    for (int y = 24; y < size - 24; y += step) {
+      for (int x = 24; x < size - 24; x += step) {
+        const cv::Vec3f m(wall_.cast<float>().eval().data());
+        fixture_.view(0).hypotheses(y, x) = cv::Vec4f(m[0], m[1], m[2], 0.1f);
+        kernel::cpu::measure_pixel(fixture_.context(), {x, y});
+        all.push_back(fixture_.view(0).checks(y, x)[0]);
+      }
+    }
+    std::nth_element(all.begin(), all.begin() + all.size() / 2, all.end());
+    constexpr double unchecked = static_cast<double>(UNCHECKED_DISPLACEMENT);
+    return static_cast<double>(all[all.size() / 2]) - 0.25 * unchecked * unchecked;
+  }
+
   static double root_mean_square(const std::vector<double>& all) {
     double sum = 0;
     for (const double displacement : all) sum += displacement * displacement;
@@ -96,6 +113,27 @@ TEST_F(Measure, SubpixelMatchNeedsEvidence) {
   }
   fixture_.interpolate();
   EXPECT_NEAR(root_mean_square(measured(0.3, true)), 0.3, 0.01) << "no texture";
+}
+
+TEST_F(Measure, GradientsOfBrightnessAndNoiseDetermineNoDistance) {
+  EXPECT_LT(median_variance(), 0.03) << "texture does";
+  // Gain and offset explain what a displacement does to a gradient.
+  for (const auto& [noise, least] : {std::pair(0.0, 0.2), std::pair(0.004, 0.05)}) {
+    for (int i = 0; i < 2; ++i) {
+      cv::Mat image = fixture_.view(i).image();
+      const cv::Mat masked = image < 0;
+      for (int y = 0; y < image.rows; ++y) {
+        for (int x = 0; x < image.cols; ++x)
+          image.at<float>(y, x) = 0.2f + 0.003f * static_cast<float>(x + y);
+      }
+      cv::Mat added(image.size(), image.type());
+      cv::RNG(i + 1).fill(added, cv::RNG::NORMAL, 0, noise);
+      image += added;
+      image.setTo(MASKED_INTENSITY, masked);
+    }
+    fixture_.interpolate();
+    EXPECT_GT(median_variance(), least) << "noise " << noise;
+  }
 }
 
 TEST_F(Measure, SubpixelMatchMovesNoFurtherThanAPatchCanTell) {

@@ -392,7 +392,7 @@ TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
 
 TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   Options options = wide_range();
-  options.far_preference = 0.02;
+  options.far_preference = 0.08;
   KernelFixture fixture(fisheye_rig(96), options);
   const ivec2 pixel(48, 48);
   const cv::Vec4f r = fixture.view(0).rays(48, 48);
@@ -409,6 +409,18 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   EXPECT_NEAR(chosen_distance(2, NO_INFORMATION_COST, 90), 90, 0.01) << "nothing to see: far";
   EXPECT_NEAR(chosen_distance(90, NO_INFORMATION_COST, 2), 90, 0.01);
   EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4) << "a difference in cost outweighs it";
+
+  // On a gradient of brightness every plane matches well.
+  for (int view = 0; view < 2; ++view) {
+    cv::Mat image = fixture.view(view).image();
+    for (int x = 0; x < image.cols; ++x) image.col(x).setTo(0.2 + 0.005 * x);
+    image += 0.02 * smooth_noise(image.size(), view + 1);
+  }
+  fixture.interpolate();
+  const double of_far = kernel::cpu::patch_cost(fixture.context(), pixel, (1.0f / 90) * ray);
+  ASSERT_LT(of_far, 0.1);
+  EXPECT_NEAR(chosen_distance(2, of_far / 1.03, 90), 90, 0.01) << "nearly as good";
+  EXPECT_NEAR(chosen_distance(2, of_far / 1.12, 90), 2, 1e-4) << "a tenth worse";
 }
 
 }  // namespace

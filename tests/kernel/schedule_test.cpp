@@ -78,7 +78,7 @@ TEST(Launches, RunOverAllViewsOfALevelWhereTheseDoNotReadEachOther) {
   // All but the first iteration try the other views' planes; two colours.
   const Options quality = Options::preset_named("quality");
   EXPECT_THAT(single_launches(make_schedule(rig, quality)),
-              AllOf(SizeIs(3 * (3 * 3 + 1 + 2 * (4 + 3 + 2 - 1))),
+              AllOf(SizeIs(3 * (3 * 3 + 1 + 2 * (3 * 2 - 1))),
                     Each(AnyOf(of_regression, Kernel::search))));
 }
 
