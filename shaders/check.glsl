@@ -12,16 +12,38 @@
 #define SUPPORT_DISPLACEMENT 1.0f
 // Of the surroundings' mean squared correlation: from a tenth on, their planes count as known from the images.
 #define EVIDENCE_SCALE 10.0f
+// Differences that tell how intensity curves: a grid of this radius and step, and the pixels between their ends and
+// middles. All lie within an image's apron.
+#define CURVATURE_RADIUS 12
+#define CURVATURE_STEP 6
+#define CURVATURE_REACH 4
+// Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
+// standard deviation of half a grey level; its inverse.
+#define PER_CERTAIN_CURVATURE 3.3e5f
+// Share of planes that are wrong where intensity does not curve at all.
+#define WRONG_WITHOUT_CURVATURE 0.4f
 
-// Variance of the reference patch over its usable pixels.
-FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
+// Variance of the reference patch over its usable pixels (x), and that of noise, by its second differences along rows,
+// which are taken for noise (y).
+FN vec2 reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   float centre = intensity_at(CONTEXT REFERENCE, pixel);
   float n = 0.0f;
   float sum = 0.0f;
   float sum_squares = 0.0f;
+  float differences = 0.0f;
+  float sum_curvature = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    float last = MASKED_INTENSITY;
+    float last_but_one = MASKED_INTENSITY;
     for (int dx = -WINDOW_RADIUS; dx <= WINDOW_RADIUS; ++dx) {
       float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
+      if (min(a, min(last, last_but_one)) >= 0.0f) {
+        float curvature = (a - last) - (last - last_but_one);
+        differences += 1.0f;
+        sum_curvature += curvature * curvature;
+      }
+      last_but_one = last;
+      last = a;
       if (a < 0.0f) continue;
       a -= centre;
       n += 1.0f;
@@ -29,7 +51,30 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
       sum_squares += a * a;
     }
   }
-  return (sum_squares - sum * sum / n) / n;
+  return vec2((sum_squares - sum * sum / n) / n, sum_curvature / (6.0f * max(differences, 1.0f)));
+}
+
+// How far intensity curves around the pixel by more than noise does, 0 to 1: where it is constant or a gradient, patches
+// match anywhere, and planes are those of what lies around, or of nothing. Differences lie along both diagonals by turns.
+FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
+  float n = 0.0f;
+  float sum = 0.0f;
+  int way = CURVATURE_REACH;
+  for (int dy = -CURVATURE_RADIUS; dy <= CURVATURE_RADIUS; dy += CURVATURE_STEP) {
+    for (int dx = -CURVATURE_RADIUS; dx <= CURVATURE_RADIUS; dx += CURVATURE_STEP) {
+      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+      float before = intensity_at(CONTEXT REFERENCE, ivec2(q.x - way, q.y - CURVATURE_REACH));
+      float middle = intensity_at(CONTEXT REFERENCE, q);
+      float after = intensity_at(CONTEXT REFERENCE, ivec2(q.x + way, q.y + CURVATURE_REACH));
+      way = -way;
+      if (min(min(before, middle), after) < 0.0f) continue;
+      float curvature = (before - middle) + (after - middle);
+      n += 1.0f;
+      sum += curvature * curvature;
+    }
+  }
+  float net = sum / (6.0f * max(n, 1.0f)) - noise;
+  return clamp(PER_CERTAIN_CURVATURE * net, 0.0f, 1.0f);
 }
 
 // Source pixels that the point moves per unit of inverse distance, at its own. Zero at an epipole.
@@ -83,11 +128,13 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
 // Probability that the point lies within two source pixels of its true place: a logistic model of the
 // displacement from the source's own plane (px), the support of the surroundings and the variance of intensity
 // that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md). Where next to nothing matches
-// around, as in the dark beyond the lens circle, planes agree because nothing contradicts them.
-FN float confidence_of(float displacement, float support, float unexplained, float evidence) {
+// around, as in the dark beyond the lens circle, planes agree because nothing contradicts them; on blank walls with
+// gradients of brightness, where everything matches, they agree because they are smooth.
+FN float confidence_of(float displacement, float support, float unexplained, float evidence, float structure) {
   float log_odds = 1.41f - 0.48f * logarithm(1.0f + 4.0f * displacement) + 1.44f * logarithm(support + 0.02f) -
                    0.31f * logarithm(unexplained + 1.5e-5f);
-  return min(evidence, 1.0f) / (1.0f + exponential(-log_odds));
+  float known = min(evidence, 1.0f) * (1.0f - WRONG_WITHOUT_CURVATURE * (1.0f - structure));
+  return known / (1.0f + exponential(-log_odds));
 }
 
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -110,10 +157,10 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       if (candidate.y < difference.y) difference = candidate;
     }
     vec4 limits = PARAMETERS.check_limits;
-    float variance = reference_variance(CONTEXT pixel);
+    vec2 variance = reference_variance(CONTEXT pixel);
     vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
     bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
-    if (variance < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
+    if (variance.x < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
     if (held.w > limits.z) reasons |= REASON_HIGH_COST;
     if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) reasons |= REASON_LOW_PARALLAX;
     if (w < PARAMETERS.patch_limits.z * length(m)) reasons |= REASON_TILT;
@@ -124,7 +171,8 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
     confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
-                               variance * min(held.w, 1.0f), support.y);
+                               variance.x * min(held.w, 1.0f), support.y,
+                               structure_of_surroundings(CONTEXT pixel, variance.y));
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
 }

@@ -310,6 +310,33 @@ TEST(Checks, AgreementWithoutEvidenceIsNotConfident) {
   EXPECT_EQ(confidence_at_cost(1.3), 0) << "nor do contrary patches speak for a plane";
 }
 
+TEST(Checks, AgreementOnGradientsOfBrightnessIsNotCertain) {
+  AgreeingViews views(wide_range());
+  cv::Mat image = views.fixture.view(0).image();
+  const auto mean_confidence = [&views] {
+    constexpr int step = 4;
+    double sum = 0;
+    int count = 0;
+    for (int y = 32; y < 64; y += step) {
+      for (int x = 32; x < 64; x += step, ++count) {
+        views.reasons({x, y});
+        sum += static_cast<double>(views.fixture.view(0).checks(y, x)[2]);
+      }
+    }
+    return sum / count;
+  };
+  const double textured = mean_confidence();
+  for (const double noise : {0.0, 0.004}) {
+    for (int x = 0; x < image.cols; ++x) image.col(x).setTo(0.2 + 0.003 * x);
+    cv::Mat added(image.size(), image.type());
+    cv::RNG(1).fill(added, cv::RNG::NORMAL, 0, noise);
+    image += added;
+    EXPECT_LT(mean_confidence(), 0.8) << "noise " << noise;
+    image += 0.06 * smooth_noise(image.size(), 1);
+    EXPECT_GT(mean_confidence(), textured) << "weak texture is as good, noise " << noise;
+  }
+}
+
 TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   Options options = wide_range();
   options.ambiguity_margin = 0.2;
