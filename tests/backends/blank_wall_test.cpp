@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// A room whose walls and ceiling have no texture, but the gradients of a lamp's light, and noise:
+// patches match anywhere on them, so that their planes must come from their edges and not from the
+// far end of the range.
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "synthesis/render.h"
+#include "widestereo/matcher.h"
+
+namespace widestereo::test {
+namespace {
+
+using Eigen::Vector3d;
+using Pattern = synthesis::Paint::Pattern;
+
+constexpr int size = 256;
+
+RenderedPair render_blank_room() {
+  synthesis::Scene scene;
+  scene.light = {0.5, -0.9, 1.5};
+  scene.ambient = 0.3;
+  const synthesis::Paint blank{{0.75, 0.75, 0.75}, {0.75, 0.75, 0.75}, Pattern::noise, 1, 0};
+  const synthesis::Paint wood{{0.7, 0.6, 0.5}, {0.3, 0.25, 0.2}, Pattern::noise, 0.15, 1.2};
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = Vector3d(0, 0, 0.8);
+  scene.surfaces.push_back(make_box(blank, pose, {5, 2.6, 6}));
+  pose.translation() = Vector3d(0, 1.25, 0.8);
+  scene.surfaces.push_back(make_box(wood, pose, {4.99, 0.1, 5.99}));
+  pose.translation() = Vector3d(-1.4, 0.7, 2);
+  scene.surfaces.push_back(make_box(wood, pose, {0.8, 1, 0.8}));
+  pose.translation() = Vector3d(0, -0.2, 3.78);
+  scene.surfaces.push_back(make_box(wood, pose, {1.2, 0.8, 0.04}));
+  RenderedPair pair = render(scene, demo_rig(size), 1);
+  for (std::size_t i = 0; i < pair.views.size(); ++i) {
+    cv::Mat& image = pair.views[i].image;
+    cv::Mat noisy(image.size(), CV_32FC3);
+    cv::RNG(i + 1).fill(noisy, cv::RNG::NORMAL, 0, 1.4);
+    cv::add(image, noisy, noisy, cv::noArray(), CV_32F);
+    cv::Mat within;
+    noisy.convertTo(within, CV_8UC3);
+    within.copyTo(image, pair.views[i].truth.valid);
+  }
+  return pair;
+}
+
+TEST(BlankWalls, AreFoundFromTheirEdgesAndNotCertain) {
+  const RenderedPair pair = render_blank_room();
+  for (const char* preset : {"fast", "quality"}) {
+    Options options = Options::preset_named(preset);
+    options.min_distance = 0.4;
+    options.max_distance = 20;
+    Device device = Device::open("cpu");
+    const ViewResult view = Matcher(device, pair.rig, options)
+                                .match({pair.views[0].image, pair.views[1].image})
+                                .views[0];
+    const auto scores =
+        evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
+    // 27 and 37 % before the preference for far planes followed the cost and gradients of
+    // brightness no longer counted as evidence.
+    EXPECT_LT(scores[1].bad_pixels.at(1), 0.18) << preset;
+    // 98 % were claimed to be right within two pixels, when 84 and 77 % were.
+    const double confidence = cv::mean(view.confidence, pair.views[0].truth.occlusion == 255)[0];
+    EXPECT_NEAR(confidence, 1 - scores[1].bad_pixels.at(2), 0.06) << preset;
+  }
+}
+
+}  // namespace
+}  // namespace widestereo::test
