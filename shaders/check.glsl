@@ -20,6 +20,8 @@
 // Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
 // standard deviation of half a grey level; its inverse.
 #define PER_CERTAIN_CURVATURE 3.3e5f
+// Largest variance that is taken for noise, of two grey levels: more may be fine texture.
+#define LARGEST_NOISE 6e-5f
 // Share of planes that are wrong where intensity does not curve at all.
 #define WRONG_WITHOUT_CURVATURE 0.4f
 
@@ -73,7 +75,7 @@ FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
       sum += curvature * curvature;
     }
   }
-  float net = sum / (6.0f * max(n, 1.0f)) - noise;
+  float net = sum / (6.0f * max(n, 1.0f)) - min(noise, LARGEST_NOISE);
   return clamp(PER_CERTAIN_CURVATURE * net, 0.0f, 1.0f);
 }
 

@@ -107,12 +107,10 @@ void MatchSettings::add_to(CLI::App& command) {
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
   add("--vote-radius", vote_radius,
       "Then pixels take the plane for which planes up to this many pixels away and the other "
-      "view's "
-      "intensities speak most; 0 = do not");
+      "view's intensities speak most; 0 = do not");
   add("--far-preference", far_preference,
       "Share of its cost by which the nearest planes must match better than the farthest, which "
-      "keeps "
-      "sky far");
+      "keeps sky far");
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
   add("--step-normal", step_normal, "First perturbation of a unit normal, at the coarsest level");
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");

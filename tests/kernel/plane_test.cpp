@@ -335,6 +335,8 @@ TEST(Checks, AgreementOnGradientsOfBrightnessIsNotCertain) {
     image += 0.06 * smooth_noise(image.size(), 1);
     EXPECT_GT(mean_confidence(), textured) << "weak texture is as good, noise " << noise;
   }
+  cv::RNG(1).fill(image, cv::RNG::NORMAL, 0.5, 0.06);
+  EXPECT_GT(mean_confidence(), 0.95 * textured) << "texture as fine as noise";
 }
 
 TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
