@@ -25,8 +25,8 @@
 // Share of planes that are wrong where intensity does not curve at all.
 #define WRONG_WITHOUT_CURVATURE 0.4f
 
-// Variance of the reference patch over its usable pixels (x), and that of noise, by its second differences along rows,
-// which are taken for noise (y).
+// Variance of the reference patch over its usable pixels (x), and of the noise in it (y), for which second differences
+// along its rows are taken.
 FN vec2 reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   float centre = intensity_at(CONTEXT REFERENCE, pixel);
   float n = 0.0f;

@@ -3,8 +3,8 @@
 
 // Variance (px^2) below which no measurement is believed.
 #define SMALLEST_VARIANCE 4e-4f
-// Of what the match leaves unexplained: the square of the slopes that noise alone makes, and somewhat less, as at edges
-// of surfaces more than noise is unexplained.
+// Square of the slopes that noise makes, in units of the variance that the match leaves unexplained: less than it is, as
+// at edges of surfaces more than noise is unexplained.
 #define NOISE_OF_SLOPES 0.25f
 // Share of a patch's information that is believed in any case.
 #define LEAST_SHARE 0.05f

@@ -58,6 +58,18 @@ inline cv::Mat smooth_noise(cv::Size size, int seed) {
   return noise;
 }
 
+/// A gradient of brightness, `along_x` and `along_y` a pixel from 0.2 on, with Gaussian noise.
+inline cv::Mat gradient(cv::Size size, double along_x, double along_y, double noise, int seed) {
+  cv::Mat image(size, CV_32FC1);
+  cv::RNG(seed).fill(image, cv::RNG::NORMAL, 0.2, noise);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      image.at<float>(y, x) += static_cast<float>(along_x * x + along_y * y);
+    }
+  }
+  return image;
+}
+
 /// Leaves of a schedule what comes up to its first dispatch of a kernel.
 inline void keep_first(Schedule& schedule, Kernel last) {
   const auto is_last = [last](const Dispatch& dispatch) { return dispatch.kernel == last; };

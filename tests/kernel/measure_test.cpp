@@ -122,13 +122,7 @@ TEST_F(Measure, GradientsOfBrightnessAndNoiseDetermineNoDistance) {
     for (int i = 0; i < 2; ++i) {
       cv::Mat image = fixture_.view(i).image();
       const cv::Mat masked = image < 0;
-      for (int y = 0; y < image.rows; ++y) {
-        for (int x = 0; x < image.cols; ++x)
-          image.at<float>(y, x) = 0.2f + 0.003f * static_cast<float>(x + y);
-      }
-      cv::Mat added(image.size(), image.type());
-      cv::RNG(i + 1).fill(added, cv::RNG::NORMAL, 0, noise);
-      image += added;
+      gradient(image.size(), 0.003, 0.003, noise, i + 1).copyTo(image);
       image.setTo(MASKED_INTENSITY, masked);
     }
     fixture_.interpolate();

@@ -327,10 +327,7 @@ TEST(Checks, AgreementOnGradientsOfBrightnessIsNotCertain) {
   };
   const double textured = mean_confidence();
   for (const double noise : {0.0, 0.004}) {
-    for (int x = 0; x < image.cols; ++x) image.col(x).setTo(0.2 + 0.003 * x);
-    cv::Mat added(image.size(), image.type());
-    cv::RNG(1).fill(added, cv::RNG::NORMAL, 0, noise);
-    image += added;
+    gradient(image.size(), 0.003, 0, noise, 1).copyTo(image);
     EXPECT_LT(mean_confidence(), 0.8) << "noise " << noise;
     image += 0.06 * smooth_noise(image.size(), 1);
     EXPECT_GT(mean_confidence(), textured) << "weak texture is as good, noise " << noise;
@@ -442,7 +439,7 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   // On a gradient of brightness every plane matches well.
   for (int view = 0; view < 2; ++view) {
     cv::Mat image = fixture.view(view).image();
-    for (int x = 0; x < image.cols; ++x) image.col(x).setTo(0.2 + 0.005 * x);
+    gradient(image.size(), 0.005, 0, 0, 1).copyTo(image);
     image += 0.02 * smooth_noise(image.size(), view + 1);
   }
   fixture.interpolate();
