@@ -33,8 +33,8 @@ void FrameSettings::add_to(CLI::App& command) {
 
 fs::path FrameSettings::example(const std::string& dataset, int first_camera) const {
   const std::vector<ws::SequenceFrame> frames =
-      folders.empty() ? ws::read_sequence(dataset, {first_camera})
-                      : ws::read_sequence({fs::path(dataset) / folders.front()});
+      folders.empty() ? ws::read_sequence(dataset, {first_camera}, skip_incomplete)
+                      : ws::read_sequence({fs::path(dataset) / folders.front()}, skip_incomplete);
   return frames.front().images.front();
 }
 

@@ -116,13 +116,29 @@ fs::file_type type_of(const fs::path& path) {
 bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::directory; }
 
 /// Of one camera, listed or not.
-Images images_of(const fs::path& folder) {
+Images images_of(const fs::path& folder, bool skip_missing) {
   const fs::path list = folder / "data.csv";
   Images images = type_of(list) == fs::file_type::regular ? images_listed_in(list)
                   : is_folder(folder / "data")            ? images_in(folder / "data")
                                                           : images_in(folder);
   images.folder = folder;
+  if (images.listed && skip_missing) {
+    std::erase_if(images.of_frames, [](const auto& image) {
+      return type_of(image.second) == fs::file_type::not_found;
+    });
+  }
   return images;
+}
+
+void require_different_folders(const std::vector<Images>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    for (std::size_t j = i + 1; j < images.size(); ++j) {
+      std::error_code error;
+      if (!fs::equivalent(images[i].folder, images[j].folder, error)) continue;
+      throw Error("Two cameras have their images in the same folder, " + images[i].folder.string() +
+                  "; give each camera its own.");
+    }
+  }
 }
 
 /// Where the images of camN are in either layout.
@@ -165,6 +181,7 @@ std::optional<std::int64_t> whole_number(const std::string& digits) {
 /// The frames of all cameras together.
 std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool skip_incomplete) {
   if (images.empty()) throw Error("A data set has no cameras; give at least one.");
+  require_different_folders(images);
   std::map<std::string, int, InOrder> counts;
   for (const Images& of_camera : images) {
     for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
@@ -230,7 +247,9 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
 std::vector<SequenceFrame> read_sequence(const std::vector<fs::path>& camera_folders,
                                          bool skip_incomplete) {
   std::vector<Images> images;
-  for (const fs::path& folder : camera_folders) images.push_back(images_of(folder));
+  for (const fs::path& folder : camera_folders) {
+    images.push_back(images_of(folder, skip_incomplete));
+  }
   return frames_of(images, skip_incomplete);
 }
 
@@ -240,7 +259,9 @@ std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vect
     throw Error("There is no folder " + folder.string() + "; check the path.");
   }
   std::vector<Images> images;
-  for (const int camera : cameras) images.push_back(images_of(camera_folder(folder, camera)));
+  for (const int camera : cameras) {
+    images.push_back(images_of(camera_folder(folder, camera), skip_incomplete));
+  }
   return frames_of(images, skip_incomplete);
 }
 

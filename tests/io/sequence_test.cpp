@@ -134,6 +134,27 @@ TEST_F(Sequences, WhatIsMissingIsNamed) {
   EXPECT_THAT(error({2}), HasSubstr("lists no images"));
 }
 
+TEST_F(Sequences, ListedFilesThatAreMissingMakeFramesIncomplete) {
+  add("mav0/cam0/data.csv", "100,a.png\n200,b.png\n300,c.png\n");
+  add("mav0/cam1/data.csv", "100,a.png\n200,b.png\n300,c.png\n");
+  for (const char* image : {"cam0/data/a.png", "cam0/data/b.png", "cam1/data/b.png"}) {
+    add("mav0/" + std::string(image));
+  }
+  EXPECT_EQ(names(read_sequence(folder_.path(), {0, 1}, true)), std::vector<std::string>{"b"});
+  EXPECT_EQ(read_sequence(folder_.path(), {0, 1}).size(), 3u) << "who reads the image names it";
+}
+
+TEST_F(Sequences, EachCameraHasAFolderOfItsOwn) {
+  add("cam0/1.png");
+  fs::create_directory_symlink("cam0", folder_ / "cam1");
+  EXPECT_THAT(error(), HasSubstr("in the same folder, " + (folder_ / "cam0").string()));
+  EXPECT_THAT(error({0, 0}), HasSubstr("the same folder"));
+  EXPECT_THAT(error_of([&] {
+                read_sequence({folder_ / "cam0", folder_ / "cam0/"});
+              }),
+              HasSubstr("give each camera its own"));
+}
+
 /// So many that the last entry, in any order, is hardly the image.
 TEST_F(Sequences, LinksToNothingAreNoImages) {
   add("cam0/1.png");
