@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <fstream>
 #include <iostream>
 #include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <regex>
 #include <string>
 #include <system_error>
 
@@ -34,24 +34,60 @@ double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
 }
 
 constexpr const char* group = "Output";
-/// Removes what an earlier run has written into the folder or, interrupted, begun to; nothing else.
-/// The record goes first: without it the folder is not complete. Files named .writing-* are left of
-/// writes that did not end, as FolderLock keeps other runs out; where a file system has no locks,
-/// one may be of a run in progress, whose write then fails.
-void remove_earlier_result(const fs::path& folder) {
-  static const std::regex names(
-      R"(distance(_accepted)?\d+\.(tiff|pfm|png)|(normals|cost|confidence)\d+\.tiff|)"
-      R"(reasons\d+\.png|cloud\d+\.ply|(distance|normals|confidence|reasons)_preview\d+\.png|)"
-      R"(summary\d+\.png|\.writing-\d+-\d+)");
-  std::vector<fs::path> files = {folder / result_record};
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (std::regex_match(entry.path().filename().string(), names)) files.push_back(entry.path());
+
+/// A folder that is gone, with all in it, when leaving scope; what an interrupted run has left in
+/// it goes first.
+class TemporaryFolder {
+ public:
+  explicit TemporaryFolder(fs::path path) : path_(std::move(path)) {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+    ws::prepare_output_folder(path_);
   }
-  for (const fs::path& file : files) {
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Removes what the record of an earlier run names, nothing else. The record goes first: without it
+/// the folder is not complete.
+void remove_earlier_result(const fs::path& folder) {
+  const Json record = record_in(folder);
+  if (!record.is_object() || !record.value("program", Json()).is_string() ||
+      !record["program"].get<std::string>().starts_with("widestereo ")) {
+    return;
+  }
+  std::vector<std::string> files = {result_record};
+  for (const std::string& file : files_of(record)) {
+    // Someone may have edited it.
+    if (!fs::path(file).has_parent_path()) files.push_back(file);
+  }
+  for (const std::string& file : files) {
     std::error_code error;
-    fs::remove(file, error);
+    fs::remove(folder / file, error);
     if (error) {
-      throw ws::Error("Cannot remove " + file.string() + " of an earlier run: " + error.message() +
+      throw ws::Error("Cannot remove " + (folder / file).string() +
+                      " of an earlier run: " + error.message() + "; choose another folder.");
+    }
+  }
+}
+
+void move_result(const fs::path& from, const fs::path& to, const Json& record) {
+  std::vector<std::string> files = files_of(record);
+  files.emplace_back(result_record);
+  for (const std::string& file : files) {
+    std::error_code error;
+    fs::rename(from / file, to / file, error);
+    if (error) {
+      throw ws::Error("Cannot write " + (to / file).string() + ": " + error.message() +
                       "; choose another folder.");
     }
   }
@@ -284,15 +320,34 @@ void FolderFormat::require_room_for(double min_distance, double max_distance) co
                       : "; give --png-scale " + text(scale) + ", say, or a narrower range."));
 }
 
+Json record_in(const fs::path& folder) {
+  return Json::parse(std::ifstream(folder / result_record), nullptr, false);
+}
+
+std::vector<std::string> files_of(const Json& record) {
+  std::vector<std::string> files;
+  if (!record.is_object() || !record.contains("views")) return files;
+  for (const Json& view : record["views"]) {
+    if (!view.is_object() || !view.contains("files")) continue;
+    for (const Json& file : view["files"]) {
+      if (file.is_string()) files.push_back(file.get<std::string>());
+    }
+  }
+  return files;
+}
+
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,
                          const FolderFormat& format) {
-  remove_earlier_result(folder);
+  const TemporaryFolder unfinished(folder / unfinished_result);
   Json record = record_of(contents, format);
   for (std::size_t i = 0; i < contents.rig.views.size(); ++i) {
-    record["views"].push_back(ViewWriter(folder, contents, format, static_cast<int>(i)).write());
+    record["views"].push_back(
+        ViewWriter(unfinished.path(), contents, format, static_cast<int>(i)).write());
   }
   if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
-  ws::write_text(folder / result_record, to_text(record) + "\n");
+  ws::write_text(unfinished.path() / result_record, to_text(record) + "\n");
+  remove_earlier_result(folder);
+  move_result(unfinished.path(), folder, record);
   return record;
 }
 

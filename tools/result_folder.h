@@ -15,6 +15,8 @@
 
 /// The record of a result folder, which is written last.
 inline constexpr const char* result_record = "result.json";
+/// Where a result is until it is complete, in the folder that it is for.
+inline constexpr const char* unfinished_result = ".unfinished";
 
 /// Which files are written.
 struct FolderFormat {
@@ -57,8 +59,13 @@ struct FolderContents {
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
 };
 
-/// Writes the folder, each file atomically and the record result.json last, so that a folder
-/// without it is not complete; returns the record. Files of an earlier result are removed first.
+/// The record in a result folder; discarded where there is none.
+nlohmann::ordered_json record_in(const std::filesystem::path& folder);
+/// Names of the files that a record says are in its folder; none where it is no record.
+std::vector<std::string> files_of(const nlohmann::ordered_json& record);
+
+/// Writes the folder; returns the record. Whenever the run ends, an earlier result and its files
+/// are there or, once the new ones are complete, replaced; the record comes last.
 nlohmann::ordered_json write_result_folder(const std::filesystem::path& folder,
                                            const FolderContents& contents,
                                            const FolderFormat& format);

@@ -16,7 +16,6 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-constexpr const char* unfinished = ".unfinished";
 constexpr const char* removed = ".removed";
 
 /// The first setting (of objects) that differs, as "NAME is A there and B now"; empty if none does.
@@ -30,11 +29,6 @@ std::string first_difference(const Json& there, const Json& now) {
     return settings.contains(path) ? settings[path].dump() : std::string("not set");
   };
   return path.to_string().substr(1) + " is " + value(a) + " there and " + value(b) + " now";
-}
-
-/// The record of a result folder; discarded where there is none.
-Json record_in(const fs::path& folder) {
-  return Json::parse(std::ifstream(folder / result_record), nullptr, false);
 }
 
 /// Results are named by files of the data set, so they lie within the folder; a record that someone
@@ -68,7 +62,7 @@ ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, b
   lock_.emplace(folder_);
   read(settings, overwrite);
   std::error_code ignored;
-  for (const char* left : {unfinished, removed}) fs::remove_all(folder_ / left, ignored);
+  for (const char* left : {unfinished_result, removed}) fs::remove_all(folder_ / left, ignored);
 }
 
 bool ResultFolders::is_record_of_result(const Json& record) const {
@@ -112,15 +106,10 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
 
 bool ResultFolders::is_there(const Json& result) const {
   const fs::path path = folder_ / result["name"].get<std::string>();
-  const Json record = record_in(path);
-  if (!record.is_object() || !record.contains("views")) return false;
-  for (const Json& view : record["views"]) {
-    if (!view.contains("files")) return false;
-    for (const Json& file : view["files"]) {
-      if (!file.is_string() || !fs::exists(path / file.get<std::string>())) return false;
-    }
-  }
-  return true;
+  const std::vector<std::string> files = files_of(record_in(path));
+  return !files.empty() && std::all_of(files.begin(), files.end(), [&path](const auto& file) {
+    return fs::exists(path / file);
+  });
 }
 
 void ResultFolders::remove(const std::string& name) const {
@@ -141,7 +130,7 @@ void ResultFolders::remove(const std::string& name) const {
 
 void ResultFolders::add(const std::string& name,
                         const std::function<Json(const fs::path&)>& write) {
-  const fs::path temporary = folder_ / unfinished;
+  const fs::path temporary = folder_ / unfinished_result;
   fs::remove_all(temporary);
   ws::prepare_output_folder(temporary);
   Json result = write(temporary);

@@ -213,12 +213,9 @@ TEST_F(Output, NothingToScoreIsAnError) {
 
 TEST_F(Output, EarlierResultsAreRemoved) {
   ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,pfm").exit_code, 0);
-  const std::set<std::string> mine = {"cloud.ply",       "distance0.txt", "mask0.png",
-                                      "result.json.bak", "summary.png",   "my_cloud0.ply"};
+  const std::set<std::string> mine = {"cloud.ply", "distance0.txt", "distance7.png", "cloud2.ply"};
   for (const std::string& name : mine) folder_.write("out/" + name, "mine");
-  for (const char* name : {".writing-123-7", "summary12.png", "distance7.png"}) {
-    folder_.write(std::string("out/") + name, "of an earlier run");
-  }
+  fs::create_directories(folder_ / "out/.unfinished/of a killed run");
   ASSERT_EQ(run(depth_of("right.png", "left.png") + "--no-cloud --no-pictures").exit_code, 0);
   std::set<std::string> expected = mine;
   expected.insert("result.json");
@@ -242,13 +239,29 @@ TEST_F(Output, TwoRunsNeedTwoFolders) {
   close(other);
 }
 
-TEST_F(Output, InterruptedResultsHaveNoRecord) {
+TEST_F(Output, OnlyFilesThatARecordOfOursNamesAreRemoved) {
+  fs::create_directories(folder_ / "out");
+  folder_.write("out/result.json", R"({"program": "other", "views": [{"files": {"a": "a.txt"}}]})");
+  for (const char* name : {"out/a.txt", "out/distance7.png", "b.txt"}) folder_.write(name, "mine");
   ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 0);
+  EXPECT_EQ(bytes_of("out/a.txt"), "mine");
+  EXPECT_EQ(bytes_of("out/distance7.png"), "mine");
+  auto record = nlohmann::json::parse(bytes_of("out/result.json"));
+  record["views"][0]["files"]["b.txt"] = "../b.txt";
+  folder_.write("out/result.json", record.dump());
+  ASSERT_EQ(run(depth_of("right.png", "left.png") + "--no-cloud").exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "out/cloud0.ply"));
+  EXPECT_EQ(bytes_of("b.txt"), "mine");
+}
+
+TEST_F(Output, InterruptedRunsLeaveTheEarlierResult) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 0);
+  const std::set<std::string> files = files_in("out");
+  const std::string record = bytes_of("out/result.json");
   const Outcome outcome = run(depth_of("right.png", "left.png"), "trap '' XFSZ; ulimit -f 100;");
   EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
-  EXPECT_TRUE(fs::exists(folder_ / "out/distance0.tiff"));
-  EXPECT_FALSE(fs::exists(folder_ / "out/result.json"));
-  EXPECT_FALSE(fs::exists(folder_ / "out/distance1.tiff")) << "of the earlier run";
+  EXPECT_EQ(files_in("out"), files);
+  EXPECT_TRUE(bytes_of("out/result.json") == record);
 }
 
 TEST_F(Output, DistancesMustFitSinglePrecision) {
