@@ -111,11 +111,13 @@ class Reconstruction {
         groups_(groups_of(images_, arguments)),
         options_(options_of(groups_, images_, arguments)),
         device_(open_device(arguments.settings)),
-        folders_(
-            arguments.output,
-            {.name = "reconstruction", .results = "images", .texts = {}, .numbers = {"accepted"}},
-            settings_of(arguments, groups_, options_.front(), device_.info()),
-            arguments.overwrite) {}
+        folders_(arguments.output,
+                 {.name = ResultFolders::reconstruction,
+                  .results = "images",
+                  .texts = {},
+                  .numbers = {"accepted"}},
+                 settings_of(arguments, groups_, options_.front(), device_.info()),
+                 arguments.overwrite) {}
 
   void run() {
     const auto alone = std::count_if(groups_.begin(), groups_.end(), is_alone);

@@ -78,7 +78,12 @@ bool ResultFolders::is_record_of_result(const Json& record) const {
 }
 
 void ResultFolders::read(const Json& settings, bool overwrite) {
-  const fs::path path = folder_ / (kind_.name + ".json");
+  for (const char* other : {sequence, reconstruction}) {
+    if (other == kind_.name || !fs::exists(record_path(other))) continue;
+    throw ws::Error(folder_.string() + " holds a " + other + "; choose another folder for the " +
+                    kind_.name + ".");
+  }
+  const fs::path path = record_path(kind_.name);
   record_ = {{"settings", settings}, {kind_.results, Json::array()}};
   if (!fs::exists(path)) return;
   const Json before = Json::parse(std::ifstream(path), nullptr, false);
@@ -152,5 +157,5 @@ void ResultFolders::note(const std::string& key, Json value) {
 }
 
 void ResultFolders::write_record() const {
-  ws::write_text(folder_ / (kind_.name + ".json"), to_text(record_) + "\n");
+  ws::write_text(record_path(kind_.name), to_text(record_) + "\n");
 }

@@ -20,16 +20,20 @@ class ResultFolders {
  public:
   using Json = nlohmann::ordered_json;
 
+  static constexpr const char* sequence = "sequence";
+  static constexpr const char* reconstruction = "reconstruction";
+
   struct Kind {
-    std::string name;                  ///< of the run: the record is NAME.json
+    std::string name;                  ///< of the run, as above: the record is NAME.json
     std::string results;               ///< what it has many of, the record's key
     std::vector<std::string> texts;    ///< that the record of each result has
     std::vector<std::string> numbers;  ///< likewise
   };
 
-  /// Takes up the folder where an earlier run left it. `settings`: all that decides the results;
-  /// throws Error naming the first difference to those of an earlier run. With `overwrite` its
-  /// results are removed instead, as soon as there is a new one.
+  /// Takes up the folder where an earlier run left it; throws Error where that was of another kind.
+  /// `settings`: all that decides the results; throws Error naming the first difference to those of
+  /// an earlier run. With `overwrite` its results are removed instead, as soon as there is a new
+  /// one.
   ResultFolders(std::filesystem::path folder, Kind kind, const Json& settings, bool overwrite);
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -53,6 +57,9 @@ class ResultFolders {
   void note(const std::string& key, Json value);
 
  private:
+  std::filesystem::path record_path(const std::string& kind) const {
+    return folder_ / (kind + ".json");
+  }
   void read(const Json& settings, bool overwrite);
   bool is_record_of_result(const Json& record) const;
   /// Removes a result, of this run or of an earlier one.

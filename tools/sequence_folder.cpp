@@ -38,7 +38,7 @@ bool has_values(const Json& record, const Json& values) {
 
 SequenceFolder::SequenceFolder(fs::path folder, const Json& settings, bool overwrite)
     : results_(std::move(folder),
-               {.name = "sequence",
+               {.name = ResultFolders::sequence,
                 .results = "frames",
                 .texts = {"start", "motion"},
                 .numbers = {"milliseconds", "motion_milliseconds", "patch_samples", "accepted",

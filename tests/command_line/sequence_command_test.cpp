@@ -192,6 +192,18 @@ TEST_F(SequenceCommand, FoldersOfOthersAreLeftAlone) {
   expect_left_alone();
 }
 
+TEST_F(SequenceCommand, AFolderHoldsOneKindOfRun) {
+  ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
+  const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +
+                                  quick + "--min-views 1 --count 1 -o ";
+  expect_error(reconstruct + file("out"),
+               "out holds a sequence; choose another folder for the reconstruction.");
+  expect_error(reconstruct + file("out") + " --overwrite", "out holds a sequence");
+  EXPECT_FALSE(fs::exists(folder_ / "out/000/cam0"));
+  ASSERT_EQ(run(reconstruct + file("dense")).exit_code, 0);
+  expect_error(sequence("dense"), "dense holds a reconstruction; choose another folder");
+}
+
 TEST_F(SequenceCommand, DamagedRecordsAreRefusedAndDamagedFramesMatchedAgain) {
   ASSERT_EQ(run(sequence() + "--count 2").exit_code, 0);
   fs::remove(folder_ / "out/001/cost1.tiff");
