@@ -51,21 +51,38 @@ std::size_t sources_of(const ReconstructArguments& arguments) {
   return static_cast<std::size_t>(arguments.sources.value_or(2));
 }
 
-/// To match with each other; throws Error where no image has another one.
+std::size_t alone_in(const std::vector<Images>& groups) {
+  return static_cast<std::size_t>(std::count_if(groups.begin(), groups.end(), is_alone));
+}
+
+/// Of cameras that look around each sees what but few others do, and there is nothing else.
+bool is_one_group(const PosedImages& images, const ReconstructArguments& arguments) {
+  const std::size_t all = images.views.size();
+  return images.are_of_one_frame && !arguments.sources && all > 1 && all <= ws::Matcher::most_views;
+}
+
+/// To match with each other; throws Error where no image has another one, or where no point can be
+/// in as many as --min-views asks.
 std::vector<Images> groups_of(const PosedImages& images, const ReconstructArguments& arguments) {
   const std::size_t all = images.views.size();
-  // Of cameras that look around each sees what but few others do, and there is nothing else.
-  if (images.are_of_one_frame && !arguments.sources && all > 1 && all <= ws::Matcher::most_views) {
-    Images group(all);
+  std::vector<Images> groups;
+  if (is_one_group(images, arguments)) {
+    Images& group = groups.emplace_back(all);
     std::iota(group.begin(), group.end(), 0);
-    return {group};
+  } else {
+    groups = images.selection->groups(1 + sources_of(arguments));
   }
-  std::vector<Images> groups = images.selection->groups(1 + sources_of(arguments));
-  if (std::all_of(groups.begin(), groups.end(), is_alone)) {
+  const std::size_t matched = all - alone_in(groups);
+  if (matched == 0) {
     throw ws::Error(arguments.images.images +
                     " has no images that see the same from different places; by the points of a "
                     "COLMAP model (points3D), or by poses and the range of distances, it is told "
                     "which do.");
+  }
+  if (arguments.fusion.min_views > static_cast<int>(matched)) {
+    throw ws::Error("--min-views " + std::to_string(arguments.fusion.min_views) +
+                    " leaves out every point of the " + std::to_string(matched) +
+                    " images that are matched; give " + std::to_string(matched) + " at most.");
   }
   return groups;
 }
@@ -120,10 +137,10 @@ class Reconstruction {
                  arguments.overwrite) {}
 
   void run() {
-    const auto alone = std::count_if(groups_.begin(), groups_.end(), is_alone);
+    const std::size_t alone = alone_in(groups_);
     if (alone > 0) {
       std::fprintf(stderr,
-                   "widestereo: %ld of %zu images see nothing that others see and are left out.\n",
+                   "widestereo: %zu of %zu images see nothing that others see and are left out.\n",
                    alone, images_.views.size());
     }
     keep_results();

@@ -289,6 +289,8 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   const std::string mask = " --mask " + file("left.png");
   expect_error(reconstruct() + mask + mask, "--mask is for all images");
   EXPECT_NE(run(reconstruct() + "--sources 0").exit_code, 0);
+  expect_error(reconstruct() + "--min-views 3",
+               "--min-views 3 leaves out every point of the 2 images that are matched; give 2");
   expect_error(reconstruct() + "--min-distance 1000", "The distance range from 1000");
   std::filesystem::remove(folder_ / "images/away.png");
   expect_error(reconstruct(), "away.png is missing");
