@@ -2,6 +2,7 @@
 #include "matching_run.h"
 
 #include <iostream>
+#include <opencv2/core.hpp>
 
 #include "progress_bar.h"
 #include "widestereo/error.h"
@@ -36,6 +37,20 @@ void require_no_validation_messages(const ws::Device& device) {
                   " message(s) of the Vulkan validation layers; the first: " + messages.front());
 }
 
+void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
+  constexpr double noise = 4;  // grey levels, of black pixels
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const ws::View& view = rig.views[i];
+    double darkest = 0;
+    double brightest = 0;
+    cv::minMaxLoc(ws::to_grey_levels(images[i], "The image of " + view.name), &darkest, &brightest,
+                  nullptr, nullptr, view.mask);
+    if (brightest - darkest > noise) continue;
+    std::cerr << "widestereo: the image of " << view.name
+              << " is blank but for noise; check its camera and lens.\n";
+  }
+}
+
 MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
                          const std::vector<cv::Mat>& images, const std::string& output) {
   MatchingRun run;
@@ -43,6 +58,7 @@ MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
   ws::Device device = open_device(settings);
   run.device = device.info();
   ws::Matcher matcher(device, rig, run.options);
+  report_blank_images(rig, images);
   ws::prepare_output_folder(output);
   run.lock = std::make_shared<const FolderLock>(output);
   {

@@ -31,6 +31,10 @@ widestereo::Device open_device(const MatchSettings& settings);
 /// Throws Error when validation was asked for and reported anything.
 void require_no_validation_messages(const widestereo::Device& device);
 
+/// Says, on standard error, which images show nothing but noise: black ones, of a covered lens or a
+/// camera that failed.
+void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
+
 /// Throws Error also when validation was asked for and reported anything. Once nothing else can be
 /// wrong with the request, and before the work, the output folder is prepared and locked.
 MatchingRun match_images(const MatchSettings& settings, const widestereo::Rig& rig,

@@ -197,6 +197,7 @@ class Reconstruction {
       rig.views.push_back(images_.views[image]);
       pixels.push_back(images_.read(image));
     }
+    report_blank_images(rig, pixels);
     MatchingRun run{.options = options_[number], .device = device_.info(), .result = {}};
     ws::Matcher matcher(device_, rig, run.options);
     run.result = matcher.match(pixels, bar.part(number, count));

@@ -295,6 +295,22 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
             0);
 }
 
+TEST_F(Command, BlankImagesAreNamed) {
+  cv::Mat dark(96, 96, CV_8UC1);
+  cv::randu(dark, 0, 4);
+  cv::imwrite(file("dark.png"), dark);
+  std::string three = bytes_of("calib.yaml");
+  three += "cam2" + three.substr(three.find("cam1:") + 4);
+  folder_.write("three.yaml", three);
+  const Outcome outcome =
+      run("depth " + file("left.png") + " " + file("right.png") + " " + file("dark.png") + " -c " +
+          file("three.yaml") + " -o " + file("out") + quick);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("the image of cam2 is blank"), std::string::npos) << outcome.output;
+  EXPECT_EQ(outcome.output.find("cam1 is blank"), std::string::npos) << outcome.output;
+  EXPECT_EQ(run(depth_of("left.png", "right.png")).output.find("blank"), std::string::npos);
+}
+
 TEST_F(Command, UnknownCommandsAreNamed) {
   const auto expect = [](const std::string& arguments, const std::string& message) {
     const Outcome outcome = run(arguments);
