@@ -17,6 +17,8 @@ using widestereo::Propagation;
 
 namespace {
 
+constexpr const char* matching = "Matching";
+
 template <class T>
 void take(T& target, const std::optional<T>& given) {
   if (given) target = *given;
@@ -56,7 +58,6 @@ void MatchSettings::add_to(CLI::App& command) {
       ->check(CLI::Range(0L, 1'000'000'000'000L))
       ->group(devices);
 
-  const std::string matching = "Matching";
   const auto add = [&](const std::string& name, auto& target, const std::string& help) {
     return command.add_option(name, target, help)->group(matching);
   };
@@ -114,8 +115,6 @@ void MatchSettings::add_to(CLI::App& command) {
   add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
   add("--step-normal", step_normal, "First perturbation of a unit normal, at the coarsest level");
   add("--source-planes", source_planes, "Try the source views' own planes: true or false");
-  add("--warm-iterations", warm_iterations, "Iterations of a frame started from the previous one");
-  add("--warm-regressions", warm_regressions, "Plane regressions of such a frame");
   add("--best-sources", best_sources, "Cost = mean over this many best source views");
   add("--min-texture", min_texture, "Smallest standard deviation of a patch, grey levels of 255");
   add("--min-visible", min_visible, "Share of a patch that must be seen in the source");
@@ -137,6 +136,16 @@ void MatchSettings::add_to(CLI::App& command) {
             "Reject where another place costs less by more than this; 0 = not checked");
   add_check("--fill-radius", fill_radius,
             "Fill rejected pixels from accepted ones up to this many pixels away; 0 = do not");
+}
+
+void MatchSettings::add_for_sequences_to(CLI::App& command) {
+  add_to(command);
+  command
+      .add_option("--warm-iterations", warm_iterations,
+                  "Iterations of a frame started from the previous one")
+      ->group(matching);
+  command.add_option("--warm-regressions", warm_regressions, "Plane regressions of such a frame")
+      ->group(matching);
 }
 
 void MatchSettings::require_effect(const Options& options) const {

@@ -40,6 +40,8 @@ struct MatchSettings {
 
   /// Adds --preset, --device and one option for each parameter.
   void add_to(CLI::App& command);
+  /// The same and those of frames started from the previous one.
+  void add_for_sequences_to(CLI::App& command);
   /// The preset with the given values in place.
   widestereo::Options options() const;
 

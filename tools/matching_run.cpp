@@ -27,6 +27,13 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
 ws::Device open_device(const MatchSettings& settings) {
   ws::Device device = ws::Device::open(settings.device);
   if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
+  const char* of_vulkan = settings.device.validation               ? "--validation"
+                          : settings.device.pipeline_cache.empty() ? nullptr
+                                                                   : "--pipeline-cache";
+  if (of_vulkan != nullptr && device.info().kind != ws::DeviceKind::vulkan) {
+    throw ws::Error(std::string(of_vulkan) + " has no effect on " + device.info().name +
+                    "; leave it out, or choose --device vulkan.");
+  }
   return device;
 }
 

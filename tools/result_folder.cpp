@@ -298,7 +298,10 @@ void FolderFormat::add_extras_to(CLI::App& command, const std::string& clouds) {
 
 void FolderFormat::require_room_for(double min_distance, double max_distance) const {
   constexpr double largest = std::numeric_limits<std::uint16_t>::max();
-  if (std::find(maps.begin(), maps.end(), "png") == maps.end()) return;
+  if (std::find(maps.begin(), maps.end(), "png") == maps.end()) {
+    if (png_scale == usual_png_scale) return;
+    throw ws::Error("--png-scale has no effect without --formats png; give it, or leave that out.");
+  }
   // What is rounded to 0 reads as no value.
   const auto is_lost = [min_distance](double scale) {
     return std::round(min_distance * scale) < 1;

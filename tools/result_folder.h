@@ -21,7 +21,8 @@ inline constexpr const char* unfinished_result = ".unfinished";
 /// Which files are written.
 struct FolderFormat {
   std::vector<std::string> maps = {"tiff"};  ///< of distance: tiff, pfm, png
-  double png_scale = 1000;                   ///< units per metre of the 16-bit PNG
+  static constexpr double usual_png_scale = 1000;
+  double png_scale = usual_png_scale;  ///< units per metre of the 16-bit PNG
   bool no_cloud = false;
   bool no_pictures = false;
   /// Adds --formats, --png-scale, --no-cloud and --no-pictures.
@@ -30,7 +31,7 @@ struct FolderFormat {
   void add_for_many_frames_to(CLI::App& command);
   /// --clouds and --pictures alone: maps that are read again are TIFFs.
   void add_for_fused_images_to(CLI::App& command);
-  /// Throws Error where a PNG cannot hold all distances of this range.
+  /// Throws Error where a PNG cannot hold all distances of this range, or --png-scale is of none.
   void require_room_for(double min_distance, double max_distance) const;
 
  private:

@@ -277,6 +277,10 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
                              "--source-planes false", "--level-iterations 1,1,1"}) {
     expect_error(depth + "--preset paper " + option, "has no effect with the preset paper");
   }
+  expect_error(depth + "--png-scale 100", "--png-scale has no effect without --formats png");
+  expect_error(depth + "--validation", "--validation has no effect on CPU");
+  expect_error(depth + "--pipeline-cache x", "--pipeline-cache has no effect on CPU");
+  expect_refusal(depth + "--warm-iterations 3", "--warm-iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
   expect_refusal(depth + "--poses-tolerance 0.1", "--poses");
   expect_refusal(sequence() + "--poses p.txt --no-motion", "excludes");
