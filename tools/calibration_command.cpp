@@ -9,6 +9,7 @@
 #include "json_text.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
+#include "white_level.h"
 #include "widestereo/calibration.h"
 #include "widestereo/epipolar.h"
 #include "widestereo/error.h"
@@ -27,6 +28,7 @@ struct CalibrationArguments {
   bool intrinsics = false;
   RigSettings rig;
   PoseSettings poses;
+  WhiteLevel white_level;
   bool as_json = false;
 };
 
@@ -191,8 +193,8 @@ std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
 }
 
 void check(const CalibrationArguments& arguments) {
-  const cv::Mat left = ws::read_image(arguments.left);
-  const cv::Mat right = ws::read_image(arguments.right);
+  const cv::Mat left = arguments.white_level.read(arguments.left);
+  const cv::Mat right = arguments.white_level.read(arguments.right);
   const ws::CalibratedImages images =
       calibrated_images(arguments.rig, arguments.poses, {arguments.left, arguments.right},
                         left.size(), arguments.rig.sfm_model());
@@ -242,8 +244,8 @@ void check(const CalibrationArguments& arguments) {
 }
 
 /// Matches between all pairs of views, those of all frames together.
-std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig,
-                                          const std::vector<std::string>& files) {
+std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig, const std::vector<std::string>& files,
+                                          const WhiteLevel& white_level) {
   const std::size_t count = rig.views.size();
   std::vector<ws::ViewMatches> pairs;
   for (std::size_t i = 0; i < count; ++i) {
@@ -252,7 +254,7 @@ std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig,
   for (std::size_t frame = 0; frame < files.size(); frame += count) {
     std::vector<cv::Mat> images;
     for (std::size_t i = 0; i < count; ++i) {
-      images.push_back(ws::read_image(files[frame + i]));
+      images.push_back(white_level.read(files[frame + i]));
       ws::require_calibrated_size(images[i], rig.views[i], files[frame + i]);
     }
     for (ws::ViewMatches& pair : pairs) {
@@ -325,7 +327,8 @@ void refine(const CalibrationArguments& arguments) {
                     "or more.");
   }
   ws::require_writable(arguments.output);
-  const std::vector<ws::ViewMatches> pairs = match_frames(rig, arguments.images);
+  const std::vector<ws::ViewMatches> pairs =
+      match_frames(rig, arguments.images, arguments.white_level);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);
   write(arguments, refined.rig);
   if (arguments.as_json) {
@@ -369,6 +372,7 @@ void add_calibration_command(CLI::App& app) {
   check_command->add_option("left", arguments->left, "Image of the first camera")->required();
   check_command->add_option("right", arguments->right, "Image of the second camera")->required();
   add_image_options(*check_command, arguments->rig, arguments->poses);
+  arguments->white_level.add_to(*check_command);
   check_command->add_flag("--json", arguments->as_json, "Print JSON");
   check_command->callback([arguments] { check(*arguments); });
 
@@ -380,6 +384,7 @@ void add_calibration_command(CLI::App& app) {
                    "frames, the better")
       ->required();
   arguments->rig.add_whole_rig_to(*refine_command);
+  arguments->white_level.add_to(*refine_command);
   refine_command->add_option("-o,--output", arguments->output, "File to write")->required();
   add_format(*refine_command);
   refine_command->add_flag("--intrinsics", arguments->intrinsics,

@@ -12,6 +12,7 @@
 #include "rig_settings.h"
 #include "sharpness_settings.h"
 #include "size_settings.h"
+#include "white_level.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -28,6 +29,7 @@ struct DepthArguments {
   RigSettings rig;
   PoseSettings poses;
   SizeSettings size;
+  WhiteLevel white_level;
   SharpnessSettings sharpness;
   MatchSettings settings;
   FolderFormat format;
@@ -62,7 +64,7 @@ void run_depth(const DepthArguments& arguments) {
   const std::optional<ws::SfmModel> model = arguments.rig.sfm_model();
   const std::vector<std::string> files = files_of(arguments, model);
   std::vector<cv::Mat> images;
-  for (const std::string& file : files) images.push_back(ws::read_image(file));
+  for (const std::string& file : files) images.push_back(arguments.white_level.read(file));
   ws::CalibratedImages calibrated =
       calibrated_images(arguments.rig, arguments.poses, files, images.front().size(), model);
   const ws::Rig& rig = calibrated.rig;
@@ -85,6 +87,7 @@ void run_depth(const DepthArguments& arguments) {
   contents.world_origin = world_origin;
   contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
+  contents.origin["white_level"] = arguments.white_level.value();
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
 }
@@ -108,6 +111,7 @@ void add_depth_command(CLI::App& app) {
                        std::to_string(default_sources) + ")")
       ->check(CLI::Range(1, ws::Matcher::most_views - 1));
   arguments->size.add_to(*command);
+  arguments->white_level.add_to(*command);
   arguments->sharpness.add_to(*command);
   command->add_option("-o,--output", arguments->output, "Folder for the results")->required();
   arguments->format.add_to(*command);

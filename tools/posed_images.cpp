@@ -28,7 +28,7 @@ std::vector<Eigen::Vector3d> centres_of(const std::vector<ws::View>& views) {
 }  // namespace
 
 cv::Mat PosedImages::read(std::size_t image) const {
-  return size.reduced(ws::read_image(files[image]), calibrated[image], files[image].string());
+  return size.reduced(white_level.read(files[image]), calibrated[image], files[image].string());
 }
 
 void PosedImageSettings::add_to(CLI::App& command) {
@@ -47,12 +47,14 @@ void PosedImageSettings::add_to(CLI::App& command) {
   poses.add_to(command, "data sets need it, but of one frame", "Data sets");
   frames.add_to(command);
   size.add_to(command);
+  white_level.add_to(command);
 }
 
 PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   PosedImages posed = ws::is_sfm_model(rig.calibration) ? of_model() : of_trajectory();
   apply_masks(posed);
   posed.size = size;
+  posed.white_level = white_level;
   for (const ws::View& view : posed.calibrated) posed.views.push_back(size.reduced(view));
   if (masks.empty()) leave_out_dark_rims(posed);
   if (posed.selection == nullptr) {

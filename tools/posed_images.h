@@ -17,6 +17,7 @@
 #include "pose_settings.h"
 #include "rig_settings.h"
 #include "size_settings.h"
+#include "white_level.h"
 #include "widestereo/sfm_model.h"
 #include "widestereo/view_selection.h"
 
@@ -27,6 +28,7 @@ struct PosedImages {
   std::vector<widestereo::View> calibrated;  ///< for the files, named as their results are
   std::vector<widestereo::View> views;       ///< the same as they are matched; with masks
   SizeSettings size;
+  WhiteLevel white_level;
   std::vector<std::filesystem::path> files;
   std::shared_ptr<const widestereo::ViewSelection> selection;
   /// That some images have by what is known of the scene; nothing for options to be taken.
@@ -47,6 +49,7 @@ struct PosedImageSettings {
   PoseSettings poses;
   FrameSettings frames;
   SizeSettings size;
+  WhiteLevel white_level;
 
   /// Adds all these options.
   void add_to(CLI::App& command);

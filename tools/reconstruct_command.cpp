@@ -112,6 +112,7 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
           {"calibration", absolute_path(a.images.rig.calibration)},
           {"mask", absolute_paths(a.images.rig.masks)},
           {"masks", absolute_path(a.images.masks)},
+          {"white_level", a.images.white_level.value()},
           {"sources", std::max(sources_of(a), groups.front().size() - 1)},
           {"clouds", !a.format.no_cloud},
           {"pictures", !a.format.no_pictures},

@@ -25,6 +25,7 @@
 #include "sharpness_settings.h"
 #include "size_settings.h"
 #include "text/number.h"
+#include "white_level.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/motion.h"
@@ -51,6 +52,7 @@ struct SequenceArguments {
   bool overwrite = false;
   RigSettings rig;
   SizeSettings size;
+  WhiteLevel white_level;
   SharpnessSettings sharpness;
   MatchSettings settings;
   FolderFormat format;
@@ -66,9 +68,9 @@ struct Selection {
   RigPoses motion;            ///< no poses where they are not known
 };
 
-std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame) {
+std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame, const WhiteLevel& white_level) {
   std::vector<cv::Mat> images;
-  for (const fs::path& path : frame.images) images.push_back(ws::read_image(path));
+  for (const fs::path& path : frame.images) images.push_back(white_level.read(path));
   return images;
 }
 
@@ -91,7 +93,7 @@ Selection select_frames(const SequenceArguments& a) {
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
   const ws::SequenceFrame& start = selection.frames.front();
-  const std::vector<cv::Mat> images = read_images(start);
+  const std::vector<cv::Mat> images = read_images(start, a.white_level);
   selection.calibrated = a.rig.rig_for_images(cameras.size(), images.front().size());
   selection.rig = selection.calibrated;
   for (ws::View& view : selection.rig.views) view = a.size.reduced(view);
@@ -112,6 +114,7 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"dataset", absolute_path(a.dataset)},
                    {"calibration", absolute_path(a.rig.calibration)},
                    {"masks", absolute_paths(a.rig.masks)},
+                   {"white_level", a.white_level.value()},
                    {"blurs", selection.blurs},
                    {"poses", absolute_path(a.poses.file)},
                    {"poses_of", selection.motion.of},
@@ -191,7 +194,8 @@ class SequenceRun {
   };
 
   std::vector<cv::Mat> images_of(const ws::SequenceFrame& frame) const {
-    return reduced(read_images(frame), frame, selection_.calibrated, arguments_.size);
+    return reduced(read_images(frame, arguments_.white_level), frame, selection_.calibrated,
+                   arguments_.size);
   }
 
   void take_up(std::size_t last) {
@@ -372,6 +376,7 @@ void add_sequence_command(CLI::App& app) {
   command->add_option("dataset", a->dataset, FrameSettings::layouts)->required();
   a->rig.add_to(*command);
   a->size.add_to(*command);
+  a->white_level.add_to(*command);
   a->sharpness.add_to(*command);
   command
       ->add_option("-o,--output", a->output,

@@ -7,6 +7,7 @@
 #include "pose_settings.h"
 #include "rig_settings.h"
 #include "size_settings.h"
+#include "white_level.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 #include "widestereo/view_synthesis.h"
@@ -21,12 +22,13 @@ struct SynthesisArguments {
   RigSettings rig;
   PoseSettings poses;
   SizeSettings size;
+  WhiteLevel white_level;
   bool as_json = false;
 };
 
 void run_synthesis(const SynthesisArguments& a) {
-  cv::Mat image = ws::read_grey_levels(a.image);
-  cv::Mat other = ws::read_grey_levels(a.other);
+  cv::Mat image = ws::to_grey_levels(a.white_level.read(a.image), a.image);
+  cv::Mat other = ws::to_grey_levels(a.white_level.read(a.other), a.other);
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
   const cv::Mat distance = ws::read_map(a.distance);
@@ -61,6 +63,7 @@ void add_view_synthesis_command(CLI::App& app) {
       ->required();
   add_image_options(*command, a->rig, a->poses);
   a->size.add_to(*command);
+  a->white_level.add_to(*command);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_synthesis(*a); });

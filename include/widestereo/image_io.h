@@ -27,6 +27,11 @@ void require_writable(const std::filesystem::path& file);
 /// damaged, no image, of another type).
 cv::Mat read_image(const std::filesystem::path& path);
 
+/// The 16-bit image of a camera with fewer bits, whose values end at `white` (4095 where it has
+/// 12), stretched to all of the 16. Throws Error for images of 8 bits and for values above; `name`
+/// begins the message.
+cv::Mat stretched(const cv::Mat& image, int white, const std::string& name);
+
 /// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA
 /// image. Throws Error on other types, empty images and non-finite values; `name` begins the
 /// message.

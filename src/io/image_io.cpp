@@ -22,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t largest_file = 4ull << 30;
+constexpr double white_of_16_bits = 65535;
 
 std::vector<uchar> read_bytes(const fs::path& path) {
   std::error_code error;
@@ -188,13 +189,28 @@ cv::Mat read_image(const fs::path& path) {
   return image;
 }
 
+cv::Mat stretched(const cv::Mat& image, int white, const std::string& name) {
+  if (image.depth() != CV_16U) {
+    throw Error(name + " has no 16 bits, so that its white is known; leave the white level out.");
+  }
+  double brightest = 0;
+  cv::minMaxLoc(image.reshape(1), nullptr, &brightest);
+  if (brightest > white) {
+    throw Error(name + " has the value " + std::to_string(cvRound(brightest)) +
+                ", above the white level " + std::to_string(white) + "; give a higher one.");
+  }
+  cv::Mat result;
+  image.convertTo(result, CV_16U, white_of_16_bits / white);
+  return result;
+}
+
 cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
   if (image.empty()) throw Error(name + " is empty; give an image.");
   double scale = 1;
   if (image.depth() == CV_8U) {
     scale = 1 / 255.0;
   } else if (image.depth() == CV_16U) {
-    scale = 1 / 65535.0;
+    scale = 1 / white_of_16_bits;
   } else if (image.depth() != CV_32F) {
     throw Error(name + " has an unsupported type; use 8 or 16 bit, or float in [0, 1].");
   }

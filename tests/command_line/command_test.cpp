@@ -315,6 +315,63 @@ TEST_F(Command, BlankImagesAreNamed) {
   EXPECT_EQ(run(depth_of("left.png", "right.png")).output.find("blank"), std::string::npos);
 }
 
+/// The same images with eight bits, and with these in files of 16.
+class FewerBits : public Command {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    for (const std::string camera : {"left", "right"}) {
+      cv::Mat image = cv::imread(file(camera + ".png"), cv::IMREAD_GRAYSCALE);
+      cv::GaussianBlur(image, image, {}, 1);
+      cv::imwrite(file(camera + ".png"), image);
+      image.convertTo(image, CV_16U);
+      cv::imwrite(file(camera + "16.png"), image);
+    }
+  }
+  static constexpr const char* advice = "give --white-level 4095";
+};
+
+TEST_F(FewerBits, AreMatchedLikeAllBitsWhereTheWhiteLevelIsGiven) {
+  const Outcome dark = run(depth_of("left16.png", "right16.png"));
+  EXPECT_EQ(dark.exit_code, 0) << dark.output;
+  EXPECT_NE(dark.output.find("left16.png has 16 bits, but no value above "), std::string::npos)
+      << dark.output;
+  EXPECT_EQ(dark.output.find(advice), dark.output.rfind(advice)) << "said once";
+  const auto map = [this] { return cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED); };
+  const cv::Mat of_dark = map();
+  const Outcome given = run(depth_of("left16.png", "right16.png") + "--white-level 255 --json");
+  ASSERT_EQ(given.exit_code, 0) << given.output;
+  EXPECT_EQ(nlohmann::json::parse(given.output)["input"]["white_level"], 255);
+  const cv::Mat of_given = map();
+  const Outcome whole = run(depth_of("left.png", "right.png"));
+  EXPECT_EQ(whole.output.find(advice), std::string::npos) << whole.output;
+  // But for rounding.
+  EXPECT_LT(cv::norm(of_given, map(), cv::NORM_L1), 1e-4 * cv::norm(map(), cv::NORM_L1));
+  EXPECT_GT(cv::norm(of_dark, map(), cv::NORM_L1), 1e-2 * cv::norm(map(), cv::NORM_L1));
+  fs::remove_all(folder_ / "out");
+  expect_error(depth_of("left.png", "right.png") + "--white-level 4095", "left.png has no 16 bits");
+}
+
+TEST_F(FewerBits, AreStretchedByEveryCommand) {
+  const cv::Mat image = cv::imread(file("left16.png"), cv::IMREAD_UNCHANGED);
+  cv::imwrite(file("left16.png"), image * 2);
+  for (const char* camera : {"cam0", "cam1"}) {
+    fs::create_directories(folder_ / "data" / camera);
+    fs::copy_file(file("left16.png"), folder_ / "data" / camera / "0.png");
+  }
+  cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
+  const std::string pair = file("left16.png") + " " + file("left16.png") + " ";
+  for (const std::string& command :
+       {"sequence " + file("data") + " -o " + file("frames") + quick,
+        "reconstruct " + file("data") + " --min-views 1 --count 1 -o " + file("dense") + quick,
+        "calibration check " + pair, "calibration refine " + pair + "-o " + file("refined.yaml "),
+        "view-synthesis " + file("far.tiff ") + pair}) {
+    const std::string arguments = command + "-c " + file("calib.yaml") + " ";
+    EXPECT_NE(run(arguments).output.find(advice), std::string::npos) << arguments;
+    expect_error(arguments + "--white-level 255", "above the white level 255");
+  }
+}
+
 TEST_F(Command, UnknownCommandsAreNamed) {
   const auto expect = [](const std::string& arguments, const std::string& message) {
     const Outcome outcome = run(arguments);

@@ -148,6 +148,21 @@ TEST(Images, BecomeIntensities) {
   EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32FC1, cv::Scalar(3)), "x"), Error);
 }
 
+TEST(Images, OfFewerBitsAreStretched) {
+  const cv::Mat of_12_bits = cv::Mat_<std::uint16_t>({1, 3}, {0, 819, 4095});
+  const cv::Mat result = stretched(of_12_bits, 4095, "x");
+  const cv::Mat expected = cv::Mat_<std::uint16_t>({1, 3}, {0, 13107, 65535});
+  EXPECT_EQ(cv::norm(result, expected, cv::NORM_INF), 0);
+  EXPECT_EQ(stretched(cv::Mat(2, 2, CV_16UC3, cv::Scalar::all(255)), 255, "x").at<ushort>(1, 5),
+            65535);
+  EXPECT_NE(error_of([&] {
+              stretched(of_12_bits, 1023, "dark.png");
+            }).find("dark.png has the value 4095, above the white level 1023"),
+            std::string::npos);
+  EXPECT_NE(error_of([] { stretched(cv::Mat(2, 2, CV_8UC1), 4095, "x"); }).find("16 bits"),
+            std::string::npos);
+}
+
 TEST(Images, MasksAreAllThatIsAboveZero) {
   const TemporaryFolder folder;
   write_image(folder / "mask.png", cv::Mat_<std::uint16_t>({1, 3}, {0, 1, 65535}));

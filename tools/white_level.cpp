@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+#include "white_level.h"
+
+#include <cstdio>
+#include <opencv2/core.hpp>
+
+#include "widestereo/image_io.h"
+
+namespace ws = widestereo;
+
+void WhiteLevel::add_to(CLI::App& command) {
+  command
+      .add_option("--white-level", value_,
+                  "Largest value of the camera where 16-bit images hold fewer bits: 4095 for 12")
+      ->check(CLI::Range(255, 65535));
+}
+
+cv::Mat WhiteLevel::read(const std::filesystem::path& file) const {
+  constexpr double of_12_bits = 4095;
+  const cv::Mat image = ws::read_image(file);
+  if (value_ > 0) return ws::stretched(image, value_, file.string());
+  if (told_ || image.depth() != CV_16U) return image;
+  double brightest = 0;
+  cv::minMaxLoc(image.reshape(1), nullptr, &brightest);
+  if (brightest > of_12_bits) return image;
+  told_ = true;
+  std::fprintf(
+      stderr,
+      "widestereo: %s has 16 bits, but no value above %.0f, and is taken for a dark image; "
+      "where the camera has 12 bits, give --white-level 4095.\n",
+      file.c_str(), brightest);
+  return image;
+}

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// The command line's option for images of cameras with fewer bits than their files.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+
+class WhiteLevel {
+ public:
+  /// Adds --white-level.
+  void add_to(CLI::App& command);
+  /// As ws::read_image(), stretched to all of 16 bits where a level is given. Where none is, says
+  /// so once of a 16-bit image that looks as if one were needed.
+  cv::Mat read(const std::filesystem::path& file) const;
+  /// 0: none given.
+  int value() const { return value_; }
+
+ private:
+  int value_ = 0;
+  mutable bool told_ = false;
+};
