@@ -7,6 +7,7 @@
 
 #include "calibration/ocam.h"
 #include "calibration/yaml_camera.h"
+#include "geometry/cross_matrix.h"
 
 namespace widestereo::calibration {
 namespace {
@@ -35,8 +36,7 @@ View read_view(const Document& document, const std::string& name) {
 
 /// Cayley's parameters c: (I + [c]x) (I - [c]x)^-1.
 Eigen::Matrix3d rotation_of(const Eigen::Vector3d& c) {
-  Eigen::Matrix3d skew;
-  skew << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+  const Eigen::Matrix3d skew = cross_matrix(c);
   const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
   return (identity + skew) * (identity - skew).inverse();
 }

@@ -10,6 +10,7 @@
 
 #include "geometry/angle.h"
 #include "statistics/percentile.h"
+#include "statistics/robust.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -228,7 +229,7 @@ class Refinement {
     const std::vector<Residual> all = residuals();
     std::vector<double> sizes;
     for (const Residual& residual : all) sizes.push_back(std::abs(residual.error));
-    const double scale = std::max(1.4826 * percentile(sizes, 0.5), smallest_scale);
+    const double scale = std::max(deviations_per_median * percentile(sizes, 0.5), smallest_scale);
     const Eigen::VectorXd precision = deviations_.cwiseAbs2().cwiseInverse();
     information_ = precision.asDiagonal();
     gradient_.resize(unknowns());
@@ -237,8 +238,8 @@ class Refinement {
     }
     gradient_ = gradient_.cwiseProduct(precision);
     for (const Residual& residual : all) {
-      // Geman and McClure's weight: false matches count for little.
-      const double doubt = 1 + residual.error * residual.error / (4 * scale * scale);
+      // Large where a match is false.
+      const double doubt = doubt_of(residual.error, scale);
       const double weight = 1 / (doubt * doubt * scale * scale);
       for (const int i : {0, 1}) {
         const Eigen::Index row = place(residual.views[i]);

@@ -8,6 +8,9 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/cross_matrix.h"
+#include "geometry/validation.h"
+#include "statistics/robust.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -44,12 +47,6 @@ struct Normals {
   double variance = 0;  ///< of the residuals, robust
   std::size_t points = 0;
 };
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 cv::Vec3f bilinear(const cv::Mat_<cv::Vec3f>& image, const Eigen::Vector2d& at) {
   const int x = static_cast<int>(at.x());
@@ -212,13 +209,13 @@ class Alignment {
     }
     normals.points = sizes.size();
     if (sizes.empty()) return normals;
-    const double scale = 1.4826 * upper_median(sizes) + 1e-4;
+    const double scale = deviations_per_median * upper_median(sizes) + 1e-4;
     normals.variance = scale * scale;
     for (std::size_t i = 0; i < of_views.size(); ++i) {
       const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);
       for (const Row& row : of_views[i]) {
-        // Geman and McClure's weight: what moves by itself or was occluded counts for little.
-        const double doubt = 1 + row.residual * row.residual / (4 * scale * scale);
+        // Large where something moves by itself or was occluded.
+        const double doubt = doubt_of(row.residual, scale);
         const double weight = 1 / (doubt * doubt);
         Eigen::Matrix<double, 8, 1> by;
         by << row.by_motion.transpose(), -row.intensity, -1;
