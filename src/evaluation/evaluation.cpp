@@ -49,13 +49,7 @@ double angle_between(const cv::Vec3f& a, const cv::Vec3f& b) {
 
 void require_maps(const cv::Mat& distance, const GroundTruth& truth, const View& reference) {
   require_truth(distance, truth);
-  const cv::Size size = distance.size();
-  if (reference.camera.width != size.width || reference.camera.height != size.height) {
-    throw Error("The distance map is " + std::to_string(size.width) + "x" +
-                std::to_string(size.height) + ", but the calibration of " + reference.name +
-                " is " + std::to_string(reference.camera.width) + "x" +
-                std::to_string(reference.camera.height) + "; give the view's own map.");
-  }
+  require_calibrated_size(distance, reference, "The distance map");
 }
 
 Eigen::Vector3d direction(const cv::Vec4f& ray) {

@@ -10,7 +10,6 @@
 
 #include "geometry/distance.h"
 #include "geometry/validation.h"
-#include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
@@ -85,15 +84,10 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
 SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
                                  const SynthesisedView& synthesised) {
   const cv::Size size = synthesised.image.size();
-  if (image.size() != size || distance.size() != size || synthesised.visible.size() != size) {
-    throw Error(
-        "A synthesised view, its distances and the image to compare differ in size; use "
-        "maps of one view.");
-  }
-  require_type(distance, CV_32FC1, "The distance map");
-  require_type(image, CV_8UC1, "The image to compare");
   require_type(synthesised.image, CV_32FC1, "The image of the synthesised view");
-  require_type(synthesised.visible, CV_8UC1, "The map of what the synthesised view shows");
+  require_map(synthesised.visible, size, CV_8UC1, "The map of what the synthesised view shows");
+  require_map(distance, size, CV_32FC1, "The distance map");
+  require_map(image, size, CV_8UC1, "The image to compare");
   cv::Mat seen, a, b;
   synthesised.visible.convertTo(seen, CV_64F, 1 / 255.0);
   image.convertTo(a, CV_64F);

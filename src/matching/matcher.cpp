@@ -5,6 +5,7 @@
 #include <chrono>
 #include <opencv2/core.hpp>
 
+#include "geometry/validation.h"
 #include "kernel/maps.h"
 #include "matching/match_setup.h"
 #include "schedule/work.h"
@@ -52,15 +53,6 @@ void require_overlap(const std::vector<ViewResult>& views) {
   throw Error(
       "The images do not overlap: no pixel of any view is seen by another one within the distance "
       "range; check the calibration, the order of the images, masks and the range.");
-}
-
-void require_planes(const cv::Mat& hypotheses, const View& view) {
-  const cv::Size size(view.camera.width, view.camera.height);
-  if (hypotheses.size() == size && hypotheses.type() == CV_32FC4) return;
-  throw Error("The planes to start " + view.name + " from are " + std::to_string(hypotheses.cols) +
-              "x" + std::to_string(hypotheses.rows) + " of type " +
-              cv::typeToString(hypotheses.type()) + ", but " + std::to_string(size.width) + "x" +
-              std::to_string(size.height) + " of CV_32FC4 are needed.");
 }
 
 void unpack_checks(const cv::Mat& checks, ViewResult& result) {
@@ -112,7 +104,9 @@ class Matcher::Implementation {
                   std::to_string(start.hypotheses.size()) + " were given to start from.");
     }
     for (std::size_t i = 0; i < start.hypotheses.size(); ++i) {
-      require_planes(start.hypotheses[i], rig_.views[i]);
+      const View& view = rig_.views[i];
+      require_map(start.hypotheses[i], {view.camera.width, view.camera.height}, CV_32FC4,
+                  "The map of planes to start " + view.name + " from");
     }
     set_motion(setup_.warm_schedule, rig_,
                start.now_from_previous.value_or(Eigen::Isometry3d::Identity()), start.frame);

@@ -270,17 +270,13 @@ void require_sizes(const Rig& rig, const std::vector<cv::Mat>& previous_images,
                 " views; its motion needs that many images of both frames, and results.");
   }
   for (std::size_t i = 0; i < count; ++i) {
-    const cv::Size size(rig.views[i].camera.width, rig.views[i].camera.height);
-    for (const cv::Mat* map :
-         {&previous_images[i], &images[i], &previous[i].hypotheses, &previous[i].reasons}) {
-      if (map->size() == size) continue;
-      throw Error("The motion of " + rig.views[i].name + " needs images and results of " +
-                  std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels.");
-    }
-    if (previous[i].hypotheses.type() != CV_32FC4 || previous[i].reasons.type() != CV_16UC1) {
-      throw Error("The motion of " + rig.views[i].name +
-                  " needs hypotheses and reasons as the matcher returns them.");
-    }
+    const View& view = rig.views[i];
+    const cv::Size size(view.camera.width, view.camera.height);
+    require_size(previous_images[i], size, "The previous image of " + view.name);
+    require_size(images[i], size, "The image of " + view.name);
+    require_map(previous[i].hypotheses, size, CV_32FC4,
+                "The previous map of planes of " + view.name);
+    require_map(previous[i].reasons, size, CV_16UC1, "The previous map of reasons of " + view.name);
   }
 }
 

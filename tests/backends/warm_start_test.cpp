@@ -139,7 +139,7 @@ TEST_P(WarmStarts, NeedPlanesThatFit) {
               HasSubstr("planes of 1"));
   start.hypotheses.assign(2, cv::Mat::zeros(3, 4, CV_32FC4));
   EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), start); }),
-              HasSubstr("cam0 from are 4x3"));
+              HasSubstr("cam0 from is 4x3"));
 }
 
 TEST_P(WarmStarts, ARefusedFrameChangesNothing) {
@@ -160,7 +160,7 @@ TEST_P(WarmStarts, ARefusedFrameChangesNothing) {
   images[1] = images[1](cv::Rect(0, 0, 9, 9));
   EXPECT_THAT(refused(images), HasSubstr("cam1"));
   bad.hypotheses[1] = cv::Mat::zeros(3, 4, CV_32FC4);
-  EXPECT_THAT(refused(images_of(frame(1))), HasSubstr("cam1 from are 4x3"));
+  EXPECT_THAT(refused(images_of(frame(1))), HasSubstr("cam1 from is 4x3"));
 
   const WarmStart start{.now_from_previous = motion_to(1)};
   const StereoResult expected = untroubled.match_next(images_of(frame(1)), start);
