@@ -12,7 +12,7 @@
 #include "option_checks.h"
 #include "roofline.h"
 #include "widestereo/error.h"
-#include "widestereo/image_io.h"
+#include "widestereo/files.h"
 #include "widestereo/matcher.h"
 #include "widestereo/synthesis.h"
 

@@ -13,6 +13,7 @@
 #include "widestereo/calibration.h"
 #include "widestereo/epipolar.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 #include "widestereo/image_io.h"
 #include "widestereo/rig_refinement.h"
 #include "widestereo/sharpness.h"

@@ -6,6 +6,7 @@
 
 #include "progress_bar.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 #include "widestereo/image_io.h"
 
 namespace ws = widestereo;

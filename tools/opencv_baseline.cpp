@@ -15,6 +15,7 @@
 
 #include "rig_settings.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 #include "widestereo/image_io.h"
 
 namespace ws = widestereo;

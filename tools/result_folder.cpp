@@ -17,6 +17,7 @@
 #include "json_text.h"
 #include "option_checks.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 #include "widestereo/image_io.h"
 #include "widestereo/pictures.h"
 #include "widestereo/point_cloud.h"

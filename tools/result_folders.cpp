@@ -8,7 +8,7 @@
 #include "json_text.h"
 #include "result_folder.h"
 #include "widestereo/error.h"
-#include "widestereo/image_io.h"
+#include "widestereo/files.h"
 
 namespace ws = widestereo;
 namespace fs = std::filesystem;

@@ -2,26 +2,12 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
-#include <iosfwd>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "widestereo/files.h"
+
 namespace widestereo {
-
-/// Writes a file: `write` fills a stream whose every byte is checked. What lies at `path` is
-/// replaced at once when all is written and left as it was when anything fails; symbolic links stay
-/// and the file that they lead to is replaced. Devices, FIFOs and /dev/stdout are written directly.
-/// Throws Error naming `path`, the cause and the remedy.
-void write_file(const std::filesystem::path& path,
-                const std::function<void(std::ostream& stream)>& write);
-
-/// Creates the folder (and parents) if needed and checks that files can be made in it. Throws Error
-/// naming the folder where either fails.
-void prepare_output_folder(const std::filesystem::path& folder);
-
-/// Throws Error where a file cannot be written, for those that are written after long work.
-void require_writable(const std::filesystem::path& file);
 
 /// Reads an 8- or 16-bit image, grey, BGR or BGRA, depth kept. Throws Error (missing, truncated,
 /// damaged, no image, of another type).
@@ -59,8 +45,5 @@ void write_map(const std::filesystem::path& path, const cv::Mat& map, double png
 /// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension). Throws Error where the extension
 /// names no format that holds it, and as write_file() does.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
-
-/// Writes text. Throws Error as write_file() does.
-void write_text(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace widestereo

@@ -8,7 +8,7 @@
 #include "calibration/formats.h"
 #include "geometry/validation.h"
 #include "widestereo/error.h"
-#include "widestereo/image_io.h"
+#include "widestereo/files.h"
 
 namespace widestereo {
 namespace calibration {

@@ -11,7 +11,7 @@
 #include "geometry/validation.h"
 #include "text/number.h"
 #include "widestereo/error.h"
-#include "widestereo/image_io.h"
+#include "widestereo/files.h"
 
 namespace widestereo {
 namespace calibration {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include "widestereo/files.h"
+
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -8,7 +10,6 @@
 #include <system_error>
 
 #include "widestereo/error.h"
-#include "widestereo/image_io.h"
 
 namespace widestereo {
 namespace {

@@ -15,6 +15,7 @@
 
 #include "io/pfm.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 
 namespace widestereo {
 namespace {

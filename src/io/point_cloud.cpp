@@ -10,7 +10,7 @@
 #include "io/bgr8.h"
 #include "io/point_cloud.h"
 #include "text/number.h"
-#include "widestereo/image_io.h"
+#include "widestereo/files.h"
 
 namespace widestereo {
 namespace {

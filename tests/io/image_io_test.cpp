@@ -20,6 +20,7 @@
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 #include "widestereo/point_cloud.h"
 
 namespace widestereo {
