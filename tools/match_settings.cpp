@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "match_settings.h"
 
-#include <initializer_list>
 #include <map>
-#include <utility>
 
 #include "widestereo/error.h"
 
@@ -14,17 +12,7 @@ using widestereo::Options;
 using widestereo::PatchPattern;
 using widestereo::PatchWarp;
 using widestereo::Propagation;
-
-namespace {
-
-constexpr const char* matching = "Matching";
-
-template <class T>
-void take(T& target, const std::optional<T>& given) {
-  if (given) target = *given;
-}
-
-}  // namespace
+using widestereo::SearchMethod;
 
 CLI::Validator warp_names() {
   return CLI::CheckedTransformer(
@@ -38,7 +26,7 @@ CLI::Validator filter_names() {
       std::map<std::string, Filter>{{"exact", Filter::exact}, {"device", Filter::device}});
 }
 
-void MatchSettings::add_to(CLI::App& command) {
+void MatchSettings::add_to(CLI::App& command, bool warm_starts) {
   const std::string devices = "Device";
   command
       .add_option("--device", device.device,
@@ -58,171 +46,141 @@ void MatchSettings::add_to(CLI::App& command) {
       ->check(CLI::Range(0L, 1'000'000'000'000L))
       ->group(devices);
 
-  const auto add = [&](const std::string& name, auto& target, const std::string& help) {
-    return command.add_option(name, target, help)->group(matching);
-  };
+  const std::string matching = "Matching";
   command.add_option("--preset", preset, "Parameters to start from")
       ->check(CLI::IsMember(Options::preset_names()))
       ->capture_default_str()
       ->group(matching);
-  add("--min-distance", min_distance, "Nearest distance along the ray, metres");
-  add("--max-distance", max_distance, "Farthest distance along the ray, metres");
-  add("--seed", seed, "Seed of the random numbers");
-  add("--window-radius", window_radius, "Patch of (2 r + 1)^2 pixels");
-  add("--warp", warp, "How a patch is mapped: exact, affine or quadratic")->transform(warp_names());
-  add("--sampling", sampling, "How distances are drawn: uniform or inverse")
+  command.add_option("--min-distance", min_distance, "Nearest distance along the ray, metres")
+      ->group(matching);
+  command.add_option("--max-distance", max_distance, "Farthest distance along the ray, metres")
+      ->group(matching);
+  // Of parameters that one method of search alone has, or all.
+  const auto adder = [&](const std::string& group, std::optional<SearchMethod> search = {}) {
+    return [=, this, &command]<class T>(const std::string& name, T Options::*parameter,
+                                        const std::string& help) {
+      const auto take = [=, this](const T& value) {
+        given_.push_back({name, search, [=](Options& options) { options.*parameter = value; }});
+      };
+      return command.add_option_function<T>(name, take, help)->group(group);
+    };
+  };
+  const auto add = adder(matching);
+  const auto add_random = adder(matching, SearchMethod::random);
+  const auto add_pyramid = adder(matching, SearchMethod::pyramid);
+  add("--seed", &Options::seed, "Seed of the random numbers");
+  add("--window-radius", &Options::window_radius, "Patch of (2 r + 1)^2 pixels");
+  add("--warp", &Options::warp, "How a patch is mapped: exact, affine or quadratic")
+      ->transform(warp_names());
+  add_random("--sampling", &Options::sampling, "How distances are drawn: uniform or inverse")
       ->transform(CLI::CheckedTransformer(std::map<std::string, DistanceSampling>{
           {"uniform", DistanceSampling::uniform}, {"inverse", DistanceSampling::inverse}}));
-  add("--propagation", propagation, "Order of pixels: checkerboard, or raster (CPU only)")
+  add("--propagation", &Options::propagation, "Order of pixels: checkerboard, or raster (CPU only)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Propagation>{
           {"checkerboard", Propagation::checkerboard}, {"raster", Propagation::raster}}));
-  add("--iterations", first_iterations, "Preset paper: iterations of the first view");
-  add("--second-iterations", second_iterations, "Preset paper: iterations of every further view");
-  add("--refinements", refinements, "Preset paper: random perturbations per pixel and iteration");
-  add("--pattern", pattern, "Pixels of a patch that are compared: dense or checkerboard")
+  add_random("--iterations", &Options::first_iterations,
+             "Preset paper: iterations of the first view");
+  add_random("--second-iterations", &Options::second_iterations,
+             "Preset paper: iterations of every further view");
+  add_random("--refinements", &Options::refinements,
+             "Preset paper: random perturbations per pixel and iteration");
+  add("--pattern", &Options::pattern, "Pixels of a patch that are compared: dense or checkerboard")
       ->transform(CLI::CheckedTransformer(std::map<std::string, PatchPattern>{
           {"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
-  add("--weight-scale", weight_scale, "Intensity scale of patch weights, grey levels; 0 = none");
-  add("--interpolation", interpolation,
+  add("--weight-scale", &Options::weight_scale,
+      "Intensity scale of patch weights, grey levels; 0 = none");
+  add("--interpolation", &Options::interpolation,
       "Intensities halfway between a source's pixels: linear or cubic")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Interpolation>{
           {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}}));
-  add("--filter", filter, "Bilinear samples of those: exact, or device (texture units of a GPU)")
+  add("--filter", &Options::filter,
+      "Bilinear samples of those: exact, or device (texture units of a GPU)")
       ->transform(filter_names());
-  add("--levels", levels, "Levels of the image pyramid");
-  add("--sweep-steps", sweep_steps, "Inverse distances tried at the coarsest level");
-  add("--level-iterations", level_iterations, "Iterations of each level, coarsest first")
+  add_pyramid("--levels", &Options::levels, "Levels of the image pyramid");
+  add_pyramid("--sweep-steps", &Options::sweep_steps,
+              "Inverse distances tried at the coarsest level");
+  add_pyramid("--level-iterations", &Options::level_iterations,
+              "Iterations of each level, coarsest first")
       ->delimiter(',');
-  add("--level-regressions", level_regressions, "Plane regressions of each level, coarsest first")
+  add_pyramid("--level-regressions", &Options::level_regressions,
+              "Plane regressions of each level, coarsest first")
       ->delimiter(',');
-  add("--regression-radius", regression_radius, "Radius of the plane regression, pixels");
-  add("--regression-steps", regression_steps,
-      "Steps in that radius of the grid of neighbours that count");
-  add("--regression-scale", regression_scale, "Intensity scale of the regression, grey levels");
-  add("--regression-precision", regression_precision,
+  add_pyramid("--regression-radius", &Options::regression_radius,
+              "Radius of the plane regression, pixels");
+  add_pyramid("--regression-steps", &Options::regression_steps,
+              "Steps in that radius of the grid of neighbours that count");
+  add_pyramid("--regression-scale", &Options::regression_scale,
+              "Intensity scale of the regression, grey levels");
+  add_pyramid(
+      "--regression-precision", &Options::regression_precision,
       "Precision that lets the regression do with a smaller neighbourhood, pixels; falls from "
       "round to round");
-  add("--subpixel-match", subpixel_match,
-      "The first regression of a level averages sub-pixel matches: true or false");
-  add("--repair-radius", repair_radius,
+  add_pyramid("--subpixel-match", &Options::subpixel_match,
+              "The first regression of a level averages sub-pixel matches: true or false");
+  add_pyramid(
+      "--repair-radius", &Options::repair_radius,
       "Rejected pixels try planes up to this many pixels away after each regression; 0 = do not");
-  add("--vote-radius", vote_radius,
+  add_pyramid(
+      "--vote-radius", &Options::vote_radius,
       "Then pixels take the plane for which planes up to this many pixels away and the other "
       "view's intensities speak most; 0 = do not");
-  add("--far-preference", far_preference,
+  add("--far-preference", &Options::far_preference,
       "Share of its cost by which the nearest planes must match better than the farthest, which "
       "keeps sky far");
-  add("--step-pixels", step_pixels, "First perturbation in the source, pixels");
-  add("--step-normal", step_normal, "First perturbation of a unit normal, at the coarsest level");
-  add("--source-planes", source_planes, "Try the source views' own planes: true or false");
-  add("--best-sources", best_sources, "Cost = mean over this many best source views");
-  add("--min-texture", min_texture, "Smallest standard deviation of a patch, grey levels of 255");
-  add("--min-visible", min_visible, "Share of a patch that must be seen in the source");
+  add_pyramid("--step-pixels", &Options::step_pixels, "First perturbation in the source, pixels");
+  add_pyramid("--step-normal", &Options::step_normal,
+              "First perturbation of a unit normal, at the coarsest level");
+  add_pyramid("--source-planes", &Options::source_planes,
+              "Try the source views' own planes: true or false");
+  if (warm_starts) {
+    add("--warm-iterations", &Options::warm_iterations,
+        "Iterations of a frame started from the previous one");
+    add_pyramid("--warm-regressions", &Options::warm_regressions,
+                "Plane regressions of such a frame");
+  }
+  add("--best-sources", &Options::best_sources, "Cost = mean over this many best source views");
+  add("--min-texture", &Options::min_texture,
+      "Smallest standard deviation of a patch, grey levels of 255");
+  add("--min-visible", &Options::min_visible, "Share of a patch that must be seen in the source");
 
-  const std::string checks = "Checks";
-  const auto add_check = [&](const std::string& name, auto& target, const std::string& help) {
-    command.add_option(name, target, help)->group(checks);
-  };
-  add_check("--consistency-relative", consistency_relative,
+  const auto add_check = adder("Checks");
+  add_check("--consistency-relative", &Options::consistency_relative,
             "Left-right check: largest relative difference of distance");
-  add_check("--consistency-pixels", consistency_pixels,
+  add_check("--consistency-pixels", &Options::consistency_pixels,
             "Left-right check: largest displacement, pixels");
-  add_check("--max-cost", max_cost, "Largest matching cost 1 - ZNCC");
-  add_check("--min-parallax", min_parallax, "Smallest parallax over the distance range, pixels");
-  add_check("--max-tilt", max_tilt, "Largest angle between normal and viewing ray, degrees");
-  add_check("--min-support", min_support,
+  add_check("--max-cost", &Options::max_cost, "Largest matching cost 1 - ZNCC");
+  add_check("--min-parallax", &Options::min_parallax,
+            "Smallest parallax over the distance range, pixels");
+  add_check("--max-tilt", &Options::max_tilt,
+            "Largest angle between normal and viewing ray, degrees");
+  add_check("--min-support", &Options::min_support,
             "Share of the planes around that must support a pixel's own; fewer are a speckle");
-  add_check("--ambiguity-margin", ambiguity_margin,
+  add_check("--ambiguity-margin", &Options::ambiguity_margin,
             "Reject where another place costs less by more than this; 0 = not checked");
-  add_check("--fill-radius", fill_radius,
+  add_check("--fill-radius", &Options::fill_radius,
             "Fill rejected pixels from accepted ones up to this many pixels away; 0 = do not");
 }
 
-void MatchSettings::add_for_sequences_to(CLI::App& command) {
-  add_to(command);
-  command
-      .add_option("--warm-iterations", warm_iterations,
-                  "Iterations of a frame started from the previous one")
-      ->group(matching);
-  command.add_option("--warm-regressions", warm_regressions, "Plane regressions of such a frame")
-      ->group(matching);
-}
-
 void MatchSettings::require_effect(const Options& options) const {
-  using Given = std::initializer_list<std::pair<const char*, bool>>;
-  const Given of_random = {{"--iterations", first_iterations.has_value()},
-                           {"--second-iterations", second_iterations.has_value()},
-                           {"--refinements", refinements.has_value()},
-                           {"--sampling", sampling.has_value()},
-                           {"--propagation raster", options.propagation == Propagation::raster}};
-  const Given of_pyramid = {{"--levels", levels.has_value()},
-                            {"--sweep-steps", sweep_steps.has_value()},
-                            {"--level-iterations", level_iterations.has_value()},
-                            {"--level-regressions", level_regressions.has_value()},
-                            {"--regression-radius", regression_radius.has_value()},
-                            {"--regression-steps", regression_steps.has_value()},
-                            {"--regression-scale", regression_scale.has_value()},
-                            {"--regression-precision", regression_precision.has_value()},
-                            {"--subpixel-match", subpixel_match.has_value()},
-                            {"--repair-radius", repair_radius.has_value()},
-                            {"--vote-radius", vote_radius.has_value()},
-                            {"--step-pixels", step_pixels.has_value()},
-                            {"--step-normal", step_normal.has_value()},
-                            {"--source-planes", source_planes.has_value()},
-                            {"--warm-regressions", warm_regressions.has_value()}};
-  const bool is_pyramid = options.search == widestereo::SearchMethod::pyramid;
-  for (const auto& [name, given] : is_pyramid ? of_random : of_pyramid) {
-    if (!given) continue;
-    throw widestereo::Error(std::string(name) + " has no effect with the preset " + options.preset +
-                            "; leave it out, or choose --preset " +
-                            (is_pyramid ? "paper." : "fast or quality."));
+  const auto refuse = [&options](const std::string& option) {
+    throw widestereo::Error(
+        option + " has no effect with the preset " + options.preset +
+        "; leave it out, or choose --preset " +
+        (options.search == SearchMethod::pyramid ? "paper." : "fast or quality."));
+  };
+  for (const Parameter& parameter : given_) {
+    if (parameter.search && parameter.search != options.search) refuse(parameter.name);
+  }
+  if (options.search == SearchMethod::pyramid && options.propagation == Propagation::raster) {
+    refuse("--propagation raster");
   }
 }
 
 Options MatchSettings::options() const {
   Options options = Options::preset_named(preset);
-  take(options.min_distance, min_distance);
-  take(options.max_distance, max_distance);
-  take(options.seed, seed);
-  take(options.window_radius, window_radius);
-  take(options.warp, warp);
-  take(options.sampling, sampling);
-  take(options.propagation, propagation);
-  take(options.first_iterations, first_iterations);
-  take(options.second_iterations, second_iterations);
-  take(options.refinements, refinements);
-  take(options.pattern, pattern);
-  take(options.weight_scale, weight_scale);
-  take(options.interpolation, interpolation);
-  take(options.filter, filter);
-  take(options.levels, levels);
-  take(options.sweep_steps, sweep_steps);
-  take(options.level_iterations, level_iterations);
-  take(options.level_regressions, level_regressions);
-  take(options.regression_radius, regression_radius);
-  take(options.regression_steps, regression_steps);
-  take(options.regression_scale, regression_scale);
-  take(options.regression_precision, regression_precision);
-  take(options.subpixel_match, subpixel_match);
-  take(options.vote_radius, vote_radius);
-  take(options.repair_radius, repair_radius);
-  take(options.far_preference, far_preference);
-  take(options.step_pixels, step_pixels);
-  take(options.step_normal, step_normal);
-  take(options.source_planes, source_planes);
-  take(options.warm_iterations, warm_iterations);
-  take(options.warm_regressions, warm_regressions);
-  take(options.best_sources, best_sources);
-  take(options.min_texture, min_texture);
-  take(options.min_visible, min_visible);
-  take(options.max_cost, max_cost);
-  take(options.min_parallax, min_parallax);
-  take(options.max_tilt, max_tilt);
-  take(options.min_support, min_support);
-  take(options.ambiguity_margin, ambiguity_margin);
-  take(options.fill_radius, fill_radius);
-  take(options.consistency_relative, consistency_relative);
-  take(options.consistency_pixels, consistency_pixels);
+  if (min_distance) options.min_distance = *min_distance;
+  if (max_distance) options.max_distance = *max_distance;
+  for (const Parameter& parameter : given_) parameter.set(options);
   require_effect(options);
   validate(options);
   return options;

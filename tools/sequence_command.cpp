@@ -407,6 +407,6 @@ void add_sequence_command(CLI::App& app) {
   command->add_flag("--overwrite", a->overwrite, "Remove the frames of an earlier run first");
   a->format.add_for_many_frames_to(*command);
   command->add_flag("--json", a->as_json, "Print the sequence's record as JSON");
-  a->settings.add_for_sequences_to(*command);
+  a->settings.add_to(*command, true);
   command->callback([a] { run_sequence(*a); });
 }
