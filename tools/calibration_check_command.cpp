@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "calibration_commands.h"
+#include "pose_settings.h"
+#include "rig_settings.h"
+#include "white_level.h"
+#include "widestereo/epipolar.h"
+#include "widestereo/sharpness.h"
+
+namespace ws = widestereo;
+
+namespace {
+
+struct CheckArguments {
+  std::string left, right;
+  RigSettings rig;
+  PoseSettings poses;
+  WhiteLevel white_level;
+  bool as_json = false;
+};
+
+std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
+  char text[160];
+  if (report.behind > 0.5) {
+    std::snprintf(text, sizeof text,
+                  "%.0f %% of the features lie behind the cameras; are the images in the order of "
+                  "the cameras?",
+                  100 * report.behind);
+  } else if (!(report.nearest > 0)) {
+    return "no feature is near enough and matched well enough to tell";
+  } else {
+    std::snprintf(text, sizeof text, "5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s",
+                  report.nearest, unit, report.typical, unit, report.farthest, unit);
+  }
+  return text;
+}
+
+void check(const CheckArguments& arguments) {
+  const cv::Mat left = arguments.white_level.read(arguments.left);
+  const cv::Mat right = arguments.white_level.read(arguments.right);
+  const ws::CalibratedImages images =
+      calibrated_images(arguments.rig, arguments.poses, {arguments.left, arguments.right},
+                        left.size(), arguments.rig.sfm_model());
+  const ws::View& first = images.rig.views[0];
+  const ws::View& second = images.rig.views[1];
+  ws::require_calibrated_size(left, first, arguments.left);
+  ws::require_calibrated_size(right, second, arguments.right);
+  const std::vector<ws::PixelMatch> matches = ws::match_features(left, right);
+  const ws::EpipolarReport r = check_epipolar(first, second, matches);
+  const auto sharpness = ws::compare_sharpness(first, second, left, right, matches);
+  // Negative where the second image is the sharper one.
+  const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
+  const char* verdict = r.median_pixels < 0.5   ? "good"
+                        : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"
+                                                : "too inaccurate for stereo: calibrate again";
+  if (arguments.as_json) {
+    // 0: there is none
+    const auto distance = [](double value) {
+      return value > 0 ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+    };
+    std::cout << nlohmann::ordered_json({{"matches", r.matches},
+                                         {"median_pixels", r.median_pixels},
+                                         {"median_degrees", r.median_degrees},
+                                         {"below_1_pixel", r.below_1_pixel},
+                                         {"below_5_pixels", r.below_5_pixels},
+                                         {"behind", r.behind},
+                                         {"distance_p5", distance(r.nearest)},
+                                         {"distance_p50", distance(r.typical)},
+                                         {"distance_p95", distance(r.farthest)},
+                                         {"first_sharper_by_pixels", blur},
+                                         {"verdict", verdict}})
+                     .dump(2)
+              << "\n";
+    return;
+  }
+  std::printf(
+      "%d matched features\n"
+      "epipolar error: median %.2f px, %.3f degrees; %.0f %% below 1 px, %.0f %% below 5 px\n"
+      "distances: %s\n"
+      "calibration: %s\n",
+      r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
+      distances_of(r, images.in_metres ? " m" : "").c_str(), verdict);
+  if (!sharpness) return;
+  std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
+              (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),
+              sharpness->blur);
+}
+
+}  // namespace
+
+void add_calibration_check_command(CLI::App& group) {
+  CLI::App* command = group.add_subcommand(
+      "check", "Measure the epipolar error of features matched between two images");
+  auto arguments = std::make_shared<CheckArguments>();
+  command->add_option("left", arguments->left, "Image of the first camera")->required();
+  command->add_option("right", arguments->right, "Image of the second camera")->required();
+  add_image_options(*command, arguments->rig, arguments->poses);
+  arguments->white_level.add_to(*command);
+  command->add_flag("--json", arguments->as_json, "Print JSON");
+  command->callback([arguments] { check(*arguments); });
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "calibration_commands.h"
+#include "calibration_output.h"
+#include "rig_settings.h"
+#include "widestereo/calibration.h"
+
+namespace ws = widestereo;
+
+namespace {
+
+struct ConvertArguments {
+  std::string input;
+  CalibrationOutput output;
+};
+
+void convert(const ConvertArguments& arguments) {
+  arguments.output.write(ws::read_calibration(arguments.input).rig);
+  std::cout << "Wrote " << arguments.output.file << "\n";
+}
+
+}  // namespace
+
+void add_calibration_convert_command(CLI::App& group) {
+  CLI::App* command = group.add_subcommand("convert", "Write another format");
+  auto arguments = std::make_shared<ConvertArguments>();
+  command->add_option("input", arguments->input, RigSettings::calibration_formats)->required();
+  command->add_option("output", arguments->output.file, "File to write")->required();
+  arguments->output.add_format_to(*command);
+  command->callback([arguments] { convert(*arguments); });
+}

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+// The command line's options of a calibration that is written.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "widestereo/rig.h"
+
+struct CalibrationOutput {
+  std::string file, format = "kalibr";
+
+  /// Adds --to.
+  void add_format_to(CLI::App& command);
+  /// As write_kalibr() or write_basalt() does.
+  void write(const widestereo::Rig& rig) const;
+};
