@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/image_io.h"
 
+#include <zlib.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -56,23 +57,6 @@ std::size_t number_at(std::span<const uchar> bytes, std::size_t position, std::s
   return number;
 }
 
-/// CRC-32 of ISO 3309, as PNG has it.
-std::uint32_t crc32(std::span<const uchar> bytes) {
-  static const auto table = [] {
-    std::array<std::uint32_t, 256> remainders{};
-    for (std::uint32_t i = 0; i < remainders.size(); ++i) {
-      remainders[i] = i;
-      for (int bit = 0; bit < 8; ++bit) {
-        remainders[i] = remainders[i] >> 1 ^ (remainders[i] & 1 ? 0xedb88320u : 0u);
-      }
-    }
-    return remainders;
-  }();
-  std::uint32_t crc = ~0u;
-  for (const uchar byte : bytes) crc = table[(crc ^ byte) & 0xff] ^ crc >> 8;
-  return ~crc;
-}
-
 /// Whether all chunks are there up to the last one, those that matter undamaged.
 bool is_whole_png(std::span<const uchar> bytes) {
   constexpr std::size_t signature = 8, around_data = 12;  // length, type and CRC of a chunk
@@ -81,7 +65,8 @@ bool is_whole_png(std::span<const uchar> bytes) {
     if (length > bytes.size() - at - around_data) return false;
     const auto type_and_data = bytes.subspan(at + 4, length + 4);
     const bool is_critical = type_and_data[0] >= 'A' && type_and_data[0] <= 'Z';
-    if (is_critical && crc32(type_and_data) != number_at(bytes, at + 8 + length, 4)) return false;
+    const auto crc = crc32_z(0, type_and_data.data(), type_and_data.size());
+    if (is_critical && crc != number_at(bytes, at + 8 + length, 4)) return false;
     if (begins_with(type_and_data, {'I', 'E', 'N', 'D'})) return true;
     at += around_data + length;
   }
