@@ -9,7 +9,7 @@ foreach(module IN LISTS MODULES)
   string(APPEND arrays "constexpr std::uint32_t ${name}[] = {${words}};\n")
   string(APPEND cases "  if (name == \"${name}\") return ${name};\n")
 endforeach()
-file(WRITE ${OUTPUT} "// Generated from shaders/*.comp.
+file(WRITE ${OUTPUT} "// Generated from shaders/.
 #include \"vulkan/shaders.h\"
 
 namespace widestereo {

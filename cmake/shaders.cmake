@@ -1,4 +1,4 @@
-# Compiles shaders/*.comp to SPIR-V, optimises and validates them where the tools exist, and embeds them in
+# Compiles the kernels to SPIR-V, optimises and validates them where the tools exist, and embeds them in
 # widestereo_vulkan. Only the Vulkan headers are needed: the loader is opened at run time.
 find_path(WIDESTEREO_VULKAN_HEADERS vulkan/vulkan.h HINTS $ENV{VULKAN_SDK}/include)
 find_program(WIDESTEREO_GLSLANG glslangValidator HINTS $ENV{VULKAN_SDK}/bin)
@@ -16,23 +16,23 @@ if(NOT WIDESTEREO_SPIRV_OPT OR NOT WIDESTEREO_SPIRV_VAL)
 endif()
 
 set(WIDESTEREO_SPIRV_TARGET vulkan1.1)
+set(shader_folder ${PROJECT_SOURCE_DIR}/shaders)
 set(spirv_folder ${PROJECT_BINARY_DIR}/shaders)
 file(MAKE_DIRECTORY ${spirv_folder})
 
 set(spirv_modules)
-file(GLOB shader_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/shaders/*.comp)
-foreach(source IN LISTS shader_sources)
-  get_filename_component(name ${source} NAME_WE)
+# The kernel `name` is `source`, compiled with further definitions.
+function(widestereo_shader name source)
   # With texture units, and as NAME_loads without (shaders/bindings.glsl).
   foreach(suffix IN ITEMS "" _loads)
     set(module ${spirv_folder}/${name}${suffix}.spv)
-    set(definitions)
+    set(definitions ${ARGN})
     if(suffix)
-      set(definitions -DTEXEL_LOADS)
+      list(APPEND definitions -DTEXEL_LOADS)
     endif()
     set(steps COMMAND ${WIDESTEREO_GLSLANG} --quiet -V --target-env ${WIDESTEREO_SPIRV_TARGET}
-                      ${definitions} -I${PROJECT_SOURCE_DIR}/shaders --depfile ${module}.d
-                      -o ${module} ${source})
+                      ${definitions} -I${shader_folder} --depfile ${module}.d
+                      -o ${module} ${shader_folder}/${source})
     if(WIDESTEREO_SPIRV_OPT)
       list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_OPT} --target-env=${WIDESTEREO_SPIRV_TARGET} -O
                                 ${module} -o ${module})
@@ -41,10 +41,22 @@ foreach(source IN LISTS shader_sources)
       list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_VAL} --target-env ${WIDESTEREO_SPIRV_TARGET}
                                 ${module})
     endif()
-    add_custom_command(OUTPUT ${module} ${steps} DEPENDS ${source} DEPFILE ${module}.d
-                       COMMENT "Compiling shaders/${name}.comp" VERBATIM)
+    add_custom_command(OUTPUT ${module} ${steps} DEPENDS ${shader_folder}/${source} DEPFILE ${module}.d
+                       COMMENT "Compiling the kernel ${name}${suffix}" VERBATIM)
     list(APPEND spirv_modules ${module})
   endforeach()
+  set(spirv_modules ${spirv_modules} PARENT_SCOPE)
+endfunction()
+
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${shader_folder}/kernel_list.h)
+file(STRINGS ${shader_folder}/kernel_list.h kernels REGEX "^KERNEL")
+foreach(kernel IN LISTS kernels)
+  string(REGEX MATCH "^KERNEL\\(([a-z0-9_]+), ([A-Z]+)\\)" matched "${kernel}")
+  widestereo_shader(${CMAKE_MATCH_1} kernel.comp -DKERNEL=${CMAKE_MATCH_1}_pixel -DVIEW=${CMAKE_MATCH_2})
+endforeach()
+# Of Vulkan alone: where an application's image is read or map is written.
+foreach(conversion IN ITEMS export_map import_image import_texture)
+  widestereo_shader(${conversion} ${conversion}.comp)
 endforeach()
 
 add_custom_command(

@@ -16,32 +16,11 @@ using kernel::ivec2;
 using kernel::cpu::Context;
 using PixelFunction = void (*)(const Context&, ivec2);
 
-/// Entry points by Kernel; iterate and iterate_raster differ only in the order of pixels.
+/// Entry points by Kernel.
 constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
-    kernel::cpu::initialise_pixel,
-    kernel::cpu::iterate_pixel,
-    kernel::cpu::iterate_pixel,
-    kernel::cpu::transfer_clear_pixel,
-    kernel::cpu::transfer_nearest_pixel,
-    kernel::cpu::transfer_winner_pixel,
-    kernel::cpu::transfer_gather_pixel,
-    kernel::cpu::check_pixel,
-    kernel::cpu::downsample_pixel,
-    kernel::cpu::sweep_pixel,
-    kernel::cpu::upsample_pixel,
-    kernel::cpu::search_pixel,
-    kernel::cpu::measure_pixel,
-    kernel::cpu::regress_pixel,
-    kernel::cpu::adopt_pixel,
-    kernel::cpu::fill_pixel,
-    kernel::cpu::adopt_fill_pixel,
-    kernel::cpu::vote_pixel,
-    kernel::cpu::transfer_keep_pixel,
-    kernel::cpu::renew_pixel,
-    kernel::cpu::interpolate_pixel,
-    kernel::cpu::subpixel_pixel,
-    kernel::cpu::ambiguity_pixel,
-    kernel::cpu::adopt_point_pixel};
+#define KERNEL(name, view) kernel::cpu::name##_pixel,
+#include "kernel_list.h"
+    kernel::cpu::iterate_pixel};  // iterate_raster differs only in the order of pixels
 
 class CpuBackend final : public Backend {
  public:

@@ -123,25 +123,6 @@ inline void transfer_winner_lower(CONTEXT_ARGUMENT ivec2 p, uint index) {
   }
 }
 
-// The order matters.
-// clang-format off
-#include "random.glsl"
-#include "plane.glsl"
-#include "patch.glsl"
-#include "search.glsl"
-#include "pyramid.glsl"
-#include "interpolation.glsl"
-#include "adaptive_search.glsl"
-#include "consistency.glsl"
-#include "measure.glsl"
-#include "subpixel.glsl"
-#include "plane_fit.glsl"
-#include "regression.glsl"
-#include "transfer.glsl"
-#include "check.glsl"
-#include "ambiguity.glsl"
-#include "fill.glsl"
-#include "vote.glsl"
-// clang-format on
+#include "algorithm.glsl"
 
 }  // namespace widestereo::kernel::cpu

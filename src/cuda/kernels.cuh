@@ -5,6 +5,8 @@
 
 #include <cuda_runtime.h>
 
+#include <string_view>
+
 #include "cuda/kernels.h"
 #include "widestereo/options.h"
 
@@ -121,26 +123,7 @@ struct Algorithm {
     atomicMin(context.transfer_winner + transfer_index(CONTEXT p), index);
   }
 
-  // The order matters.
-  // clang-format off
-#include "random.glsl"
-#include "plane.glsl"
-#include "patch.glsl"
-#include "search.glsl"
-#include "pyramid.glsl"
-#include "interpolation.glsl"
-#include "adaptive_search.glsl"
-#include "consistency.glsl"
-#include "measure.glsl"
-#include "subpixel.glsl"
-#include "plane_fit.glsl"
-#include "regression.glsl"
-#include "transfer.glsl"
-#include "check.glsl"
-#include "ambiguity.glsl"
-#include "fill.glsl"
-#include "vote.glsl"
-  // clang-format on
+#include "algorithm.glsl"
 
   /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
   FN bool thread_pixel(CONTEXT_ARGUMENT int view, ivec2& pixel) {
@@ -152,47 +135,24 @@ struct Algorithm {
   }
 };
 
-// Blocks that a multiprocessor must be able to hold, for one camera model and for any: with more
-// ptxas spills registers, without a bound it does so as well or takes so many that a block fewer
-// fits (tools/cuda_kernel_report).
-constexpr int blocks_of_one_model = 5;
-constexpr int blocks_of_any_model = 4;
+// Blocks that a multiprocessor must be able to hold: with more ptxas spills registers, without a
+// bound it does so as well or takes so many that a block fewer fits (tools/cuda_kernel_report).
+template <class C>
+constexpr int least_blocks(std::string_view kernel) {
+  if (C::camera_model < 0) return 4;
+  return kernel == "vote" ? 4 : 5;  // the planes that stand take registers
+}
 
-#define ENTRY_POINT_OF_BLOCKS(name, view, blocks)                                        \
-  template <class C>                                                                     \
-  __global__ void __launch_bounds__(block_width* block_height,                           \
-                                    C::camera_model >= 0 ? blocks : blocks_of_any_model) \
-      name(const __grid_constant__ Context context) {                                    \
-    ivec2 pixel;                                                                         \
-    if (Algorithm<C>::thread_pixel(context, view, pixel)) {                              \
-      Algorithm<C>::name##_pixel(context, pixel);                                        \
-    }                                                                                    \
+#define KERNEL(name, view)                                                             \
+  template <class C>                                                                   \
+  __global__ void __launch_bounds__(block_width* block_height, least_blocks<C>(#name)) \
+      name(const __grid_constant__ Context context) {                                  \
+    ivec2 pixel;                                                                       \
+    if (Algorithm<C>::thread_pixel(context, view, pixel)) {                            \
+      Algorithm<C>::name##_pixel(context, pixel);                                      \
+    }                                                                                  \
   }
-#define ENTRY_POINT(name, view) ENTRY_POINT_OF_BLOCKS(name, view, blocks_of_one_model)
-
-ENTRY_POINT(initialise, REFERENCE)
-ENTRY_POINT(iterate, REFERENCE)
-ENTRY_POINT(transfer_clear, REFERENCE)
-ENTRY_POINT(transfer_nearest, OTHER)
-ENTRY_POINT(transfer_winner, OTHER)
-ENTRY_POINT(transfer_gather, REFERENCE)
-ENTRY_POINT(check, REFERENCE)
-ENTRY_POINT(downsample, REFERENCE)
-ENTRY_POINT(sweep, REFERENCE)
-ENTRY_POINT(upsample, REFERENCE)
-ENTRY_POINT(search, REFERENCE)
-ENTRY_POINT(measure, REFERENCE)
-ENTRY_POINT(regress, REFERENCE)
-ENTRY_POINT(adopt, REFERENCE)
-ENTRY_POINT(fill, REFERENCE)
-ENTRY_POINT(adopt_fill, REFERENCE)
-ENTRY_POINT_OF_BLOCKS(vote, REFERENCE, 4)  // the planes that stand take registers
-ENTRY_POINT(transfer_keep, REFERENCE)
-ENTRY_POINT(renew, REFERENCE)
-ENTRY_POINT(interpolate, REFERENCE)
-ENTRY_POINT(subpixel, REFERENCE)
-ENTRY_POINT(ambiguity, REFERENCE)
-ENTRY_POINT(adopt_point, REFERENCE)
+#include "kernel_list.h"
 
 // clang-format off
 #define KERNEL_ENTRY(name, C) KernelEntry{#name, reinterpret_cast<const void*>(&name<C>)}

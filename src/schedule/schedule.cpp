@@ -502,30 +502,10 @@ void require_usable(const Rig& rig, const Options& options) {
 }  // namespace
 
 const char* to_string(Kernel kernel) {
-  static constexpr std::array<const char*, kernel_count> names = {"initialise",
-                                                                  "iterate",
-                                                                  "iterate_raster",
-                                                                  "transfer_clear",
-                                                                  "transfer_nearest",
-                                                                  "transfer_winner",
-                                                                  "transfer_gather",
-                                                                  "check",
-                                                                  "downsample",
-                                                                  "sweep",
-                                                                  "upsample",
-                                                                  "search",
-                                                                  "measure",
-                                                                  "regress",
-                                                                  "adopt",
-                                                                  "fill",
-                                                                  "adopt_fill",
-                                                                  "vote",
-                                                                  "transfer_keep",
-                                                                  "renew",
-                                                                  "interpolate",
-                                                                  "subpixel",
-                                                                  "ambiguity",
-                                                                  "adopt_point"};
+  static constexpr std::array<const char*, kernel_count> names = {
+#define KERNEL(name, view) #name,
+#include "kernel_list.h"
+      "iterate_raster"};
   return names[static_cast<std::size_t>(kernel)];
 }
 

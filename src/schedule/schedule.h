@@ -10,35 +10,14 @@
 
 namespace widestereo {
 
-/// Every kernel; each has one entry point per back end, named as to_string() says
-/// (shaders/NAME.comp).
+/// Every kernel, as shaders/kernel_list.h describes them; each has one entry point per back end,
+/// named as to_string() says.
 enum class Kernel {
-  initialise,        ///< random planes of a view and their cost
-  iterate,           ///< one colour: candidates of the neighbours, then random refinements
-  iterate_raster,    ///< the same, sequentially in raster order (CPU back end only)
-  transfer_clear,    ///< empties the transfer buffers of a view
-  transfer_nearest,  ///< forward-warps another view's planes: nearest inverse distance per pixel
-  transfer_winner,   ///< ... smallest pixel index among the nearest ones
-  transfer_gather,   ///< ... takes over the winner's plane, or a random one where there is none
-  check,             ///< consistency, reasons and confidence of a view
-  downsample,        ///< intensities of a view from those one level finer
-  sweep,             ///< fronto-spherical planes over the whole range of inverse distances
-  upsample,          ///< planes of a view from those one level coarser
-  search,            ///< one colour: candidates of eight strips, then refinement in source pixels
-  measure,           ///< how precisely each pixel is matched (kept where the checks go)
-  regress,           ///< precision-weighted plane of each pixel's neighbourhood
-  adopt,             ///< takes those planes over
-  fill,              ///< planes of accepted pixels for the rejected ones around them
-  adopt_fill,        ///< takes those planes over and marks the pixels
-  vote,              ///< planes which most of the planes around agree with
-  transfer_keep,     ///< keeps a view's own planes, moved on from the previous frame
-  renew,             ///< starts a view from those
-  interpolate,       ///< intensities of a view at half pixels
-  subpixel,          ///< moves what was measured to where each patch matches best
-  ambiguity,         ///< adds to the checks where another place matches better
-  adopt_point,       ///< takes regressed planes over whose costs follow later
+#define KERNEL(name, view) name,
+#include "kernel_list.h"
+  iterate_raster,  ///< iterate, sequentially in raster order (CPU back end only)
 };
-inline constexpr int kernel_count = 24;
+inline constexpr int kernel_count = static_cast<int>(Kernel::iterate_raster) + 1;
 const char* to_string(Kernel kernel);
 
 /// Constants compiled into a back end's kernels (specialisation constants, template arguments).

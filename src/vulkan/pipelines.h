@@ -53,7 +53,7 @@ class Pipelines {
   VkPipelineLayout layout() const { return layout_.get(); }
   /// Throws Error for iterate_raster.
   VkPipeline get(Kernel kernel) const;
-  /// A further kernel of shaders/NAME.comp with the same constants.
+  /// A further kernel, of shader_code(), with the same constants.
   Handle<VkPipeline> make(const VulkanContext& context, const std::string& name,
                           VkPipelineLayout layout, VkPipelineCache cache) const;
 

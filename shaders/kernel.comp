@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// The Vulkan entry point of a kernel of kernel_list.h: KERNEL is its function, VIEW the view over which it runs.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
@@ -9,9 +10,9 @@
 
 #include "bindings.glsl"
 
-#include "interpolation.glsl"
+#include "algorithm.glsl"
 
 void main() {
   ivec2 pixel;
-  if (thread_pixel(REFERENCE, pixel)) interpolate_pixel(pixel);
+  if (thread_pixel(VIEW, pixel)) KERNEL(pixel);
 }
