@@ -6,6 +6,7 @@
 #include "cuda/architectures.h"
 #include "cuda/cuda_backend.h"
 #include "cuda/peaks.h"
+#include "text/hexadecimal.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -47,17 +48,6 @@ int count_devices(std::string& why_none) {
   return 0;
 }
 
-std::string hexadecimal(const cudaUUID_t& uuid) {
-  constexpr char digits[] = "0123456789abcdef";
-  std::string text;
-  for (const char byte : uuid.bytes) {
-    const auto value = static_cast<unsigned char>(byte);
-    text += digits[value >> 4];
-    text += digits[value & 15];
-  }
-  return text;
-}
-
 int attribute(cudaDeviceAttr which, int index) {
   int value = 0;
   return cudaDeviceGetAttribute(&value, which, index) == cudaSuccess ? value : 0;
@@ -82,7 +72,7 @@ DeviceInfo describe_cuda_device(int index) {
       std::to_string(properties.major) + "." + std::to_string(properties.minor);
   info.driver =
       "CUDA driver " + version_text(driver_version()) + ", compute capability " + capability;
-  info.uuid = hexadecimal(properties.uuid);
+  info.uuid = hexadecimal(properties.uuid.bytes);
   // As attributes: CUDA 13 has no clocks among the properties.
   info.peaks = peaks_of({.major = properties.major,
                          .minor = properties.minor,

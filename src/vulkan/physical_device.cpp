@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernel/host.h"
+#include "text/hexadecimal.h"
 
 namespace widestereo {
 namespace {
@@ -38,16 +39,6 @@ std::string version_text(std::uint32_t version) {
   return std::to_string(VK_API_VERSION_MAJOR(version)) + "." +
          std::to_string(VK_API_VERSION_MINOR(version)) + "." +
          std::to_string(VK_API_VERSION_PATCH(version));
-}
-
-std::string hexadecimal(const std::uint8_t (&bytes)[VK_UUID_SIZE]) {
-  constexpr const char* digits = "0123456789abcdef";
-  std::string text;
-  for (const std::uint8_t byte : bytes) {
-    text += digits[byte >> 4];
-    text += digits[byte & 15];
-  }
-  return text;
 }
 
 std::string too_low(const char* limit, std::uint64_t needed, std::uint64_t offered) {
