@@ -5,8 +5,6 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-#include "widestereo/files.h"
-
 namespace widestereo {
 
 /// Reads an 8- or 16-bit image, grey, BGR or BGRA, depth kept. Throws Error (missing, truncated,

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "widestereo/error.h"
-#include "widestereo/image_io.h"
+#include "widestereo/files.h"
 
 namespace widestereo {
 namespace {
