@@ -48,7 +48,7 @@
 #define REASON_TILT 128
 #define REASON_AMBIGUOUS 256
 #define REASON_SPECKLE 512
-#define REASON_FILLED 1024
+#define REASON_FILLED 1024  // the last: FILL_WITH_MATCHES is the next bit
 
 // Bits of PassParameters.neighbours.
 #define NEIGHBOUR_LEFT 1
@@ -76,7 +76,7 @@
 #define INTERPOLATE_CUBIC 1u
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
-#define FILL_WITH_MATCHES 2048u
+#define FILL_WITH_MATCHES (2u * REASON_FILLED)
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
 // before it half the next one; those for normals alone, over an eighth, twice a half, and the whole radius; the smallest
@@ -100,7 +100,7 @@ struct MatchParameters {
   vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; smallest
                       // support
   vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
-  ivec4 search;       // distance sampling, refinements, best sources, number of views
+  ivec4 search;       // distance sampling, refinements, best sources; unused
   vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
                       // preference for far planes
   ivec4 frame;        // number of the frame since the last one that was started anew; unused

@@ -51,9 +51,8 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, int image
   };
   p.support = {inverse_scale(options.weight_scale), inverse_scale(options.regression_scale),
                single(options.ambiguity_margin), single(options.far_preference)};
-  const int views = static_cast<int>(all.size());
-  p.search = {static_cast<int>(options.sampling), options.refinements, options.best_sources, views};
-  for (int i = 0; i < views; ++i) p.cameras[i] = kernel_camera(all[i].camera);
+  p.search = {static_cast<int>(options.sampling), options.refinements, options.best_sources, 0};
+  for (std::size_t i = 0; i < all.size(); ++i) p.cameras[i] = kernel_camera(all[i].camera);
   for (int i = 0; i < images; ++i) {
     for (int j = 0; j < images; ++j) {
       p.pairs[i * MAX_IMAGES + j] = view_pair(source_from_reference(all[j], all[i]));
