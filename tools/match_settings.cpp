@@ -26,7 +26,7 @@ CLI::Validator filter_names() {
       std::map<std::string, Filter>{{"exact", Filter::exact}, {"device", Filter::device}});
 }
 
-void MatchSettings::add_to(CLI::App& command, bool warm_starts) {
+void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
   const std::string devices = "Device";
   command
       .add_option("--device", device.device,
@@ -132,11 +132,13 @@ void MatchSettings::add_to(CLI::App& command, bool warm_starts) {
               "First perturbation of a unit normal, at the coarsest level");
   add_pyramid("--source-planes", &Options::source_planes,
               "Try the source views' own planes: true or false");
-  if (warm_starts) {
+  if (no_warm_start != nullptr) {
     add("--warm-iterations", &Options::warm_iterations,
-        "Iterations of a frame started from the previous one");
+        "Iterations of a frame started from the previous one")
+        ->excludes(no_warm_start);
     add_pyramid("--warm-regressions", &Options::warm_regressions,
-                "Plane regressions of such a frame");
+                "Plane regressions of such a frame")
+        ->excludes(no_warm_start);
   }
   add("--best-sources", &Options::best_sources, "Cost = mean over this many best source views");
   add("--min-texture", &Options::min_texture,
@@ -184,4 +186,11 @@ Options MatchSettings::options() const {
   require_effect(options);
   validate(options);
   return options;
+}
+
+bool MatchSettings::asks_for_device_filter() const {
+  Options options;
+  options.filter = Filter::exact;
+  for (const Parameter& parameter : given_) parameter.set(options);
+  return options.filter == Filter::device;
 }

@@ -22,11 +22,13 @@ struct MatchSettings {
   std::optional<double> min_distance, max_distance;
 
   /// Adds --preset, --device and one option for each parameter; those of frames started from the
-  /// previous one where there are `warm_starts`. These settings must stay where they are until the
-  /// command line is parsed.
-  void add_to(CLI::App& command, bool warm_starts = false);
+  /// previous one where there is an option that excludes them, `no_warm_start`. These settings must
+  /// stay where they are until the command line is parsed.
+  void add_to(CLI::App& command, CLI::Option* no_warm_start = nullptr);
   /// The preset with the given values in place.
   widestereo::Options options() const;
+  /// --filter device was given, rather than left to the preset.
+  bool asks_for_device_filter() const;
 
  private:
   struct Parameter {

@@ -28,12 +28,17 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
 ws::Device open_device(const MatchSettings& settings) {
   ws::Device device = ws::Device::open(settings.device);
   if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
-  const char* of_vulkan = settings.device.validation               ? "--validation"
-                          : settings.device.pipeline_cache.empty() ? nullptr
-                                                                   : "--pipeline-cache";
-  if (of_vulkan != nullptr && device.info().kind != ws::DeviceKind::vulkan) {
-    throw ws::Error(std::string(of_vulkan) + " has no effect on " + device.info().name +
-                    "; leave it out, or choose --device vulkan.");
+  const ws::DeviceInfo& info = device.info();
+  const auto refuse = [&info](const std::string& option, const std::string& other) {
+    throw ws::Error(option + " has no effect on " + info.name + "; leave it out, or choose " +
+                    other + ".");
+  };
+  if (info.kind != ws::DeviceKind::vulkan) {
+    if (settings.device.validation) refuse("--validation", "--device vulkan");
+    if (!settings.device.pipeline_cache.empty()) refuse("--pipeline-cache", "--device vulkan");
+  }
+  if (settings.asks_for_device_filter() && !info.filters_intensities) {
+    refuse("--filter device", "a GPU");
   }
   return device;
 }

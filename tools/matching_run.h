@@ -25,7 +25,8 @@ struct MatchingRun {
 MatchSettings with_range(MatchSettings settings, const widestereo::CalibratedImages& images,
                          const std::string& calibration);
 
-/// Opens the device and reports, on standard error, those passed over.
+/// Opens the device and reports, on standard error, those passed over. Throws Error where a given
+/// option has no effect on it.
 widestereo::Device open_device(const MatchSettings& settings);
 
 /// Throws Error when validation was asked for and reported anything.

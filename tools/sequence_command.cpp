@@ -407,6 +407,6 @@ void add_sequence_command(CLI::App& app) {
   command->add_flag("--overwrite", a->overwrite, "Remove the frames of an earlier run first");
   a->format.add_for_many_frames_to(*command);
   command->add_flag("--json", a->as_json, "Print the sequence's record as JSON");
-  a->settings.add_to(*command, true);
+  a->settings.add_to(*command, no_warm_start);
   command->callback([a] { run_sequence(*a); });
 }

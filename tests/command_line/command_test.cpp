@@ -280,11 +280,13 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
   expect_error(depth + "--png-scale 100", "--png-scale has no effect without --formats png");
   expect_error(depth + "--validation", "--validation has no effect on CPU");
   expect_error(depth + "--pipeline-cache x", "--pipeline-cache has no effect on CPU");
+  expect_error(depth + "--filter device", "--filter device has no effect on CPU");
   expect_refusal(depth + "--warm-iterations 3", "--warm-iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
   expect_refusal(depth + "--poses-tolerance 0.1", "--poses");
   expect_refusal(sequence() + "--poses p.txt --no-motion", "excludes");
-  for (const char* option : {"--poses p.txt", "--no-motion", "--restart-below 0.5"}) {
+  for (const char* option : {"--poses p.txt", "--no-motion", "--restart-below 0.5",
+                             "--warm-iterations 1", "--warm-regressions 1"}) {
     expect_refusal(sequence() + "--no-warm-start " + option, "excludes");
   }
   cv::imwrite(file("map.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));

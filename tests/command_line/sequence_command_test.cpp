@@ -35,9 +35,11 @@ class SequenceCommand : public Command {
     }
   }
 
+  std::string cold_sequence(const std::string& output, const std::string& data = "data") const {
+    return "sequence " + file(data) + " -c " + file("calib.yaml") + " -o " + file(output) + quick;
+  }
   std::string sequence(const std::string& output = "out", const std::string& data = "data") const {
-    return "sequence " + file(data) + " -c " + file("calib.yaml") + " -o " + file(output) + quick +
-           "--warm-iterations 1 ";
+    return cold_sequence(output, data) + "--warm-iterations 1 ";
   }
   nlohmann::json record(const std::string& output = "out") const {
     return nlohmann::json::parse(bytes_of(folder_ / output / "sequence.json"));
@@ -266,7 +268,7 @@ TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const nlohmann::json frames = record()["frames"];
   EXPECT_EQ(frames[1]["start"], "cold after warm") << frames.dump(1);
-  const Outcome alone = run(sequence("alone") + "--no-warm-start --count 2");
+  const Outcome alone = run(cold_sequence("alone") + "--no-warm-start --count 2");
   ASSERT_EQ(alone.exit_code, 0) << alone.output;
   EXPECT_EQ(bytes_of(folder_ / "out/001/distance0.tiff"),
             bytes_of(folder_ / "alone/001/distance0.tiff"));
