@@ -91,7 +91,7 @@ struct Options {
   int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
   /// Coarsest level first, one for each level, 0..1000.
   std::vector<int> level_iterations = {2, 2, 2};
-  std::vector<int> level_regressions = {1, 1, 3};  ///< rounds of plane regression, likewise
+  std::vector<int> level_regressions = {1, 2, 3};  ///< rounds of plane regression, likewise
   int regression_radius = 40;  ///< largest neighbourhood of a regressed plane, pixels, 2..64; of
                                ///< normals alone four times that
   int regression_steps = 4;    ///< of the grid of neighbours that count, in its radius, 1..16

@@ -425,11 +425,8 @@ class Builder {
   void regress(Views views, double precision, unsigned how, Kernel adopt, int steps) {
     kernel::PassParameters pass = pass_of(views);
     pass.iteration = ++regressions_;
-    // A third at coarse levels, where a pixel covers more of the scene. Four times as much for
-    // normals alone: a slope needs a wider base than a distance.
-    pass.radius = pass.first_view == 0 ? options_.regression_radius
-                                       : std::max(2, options_.regression_radius / 3);
-    if (precision == 0) pass.radius *= 4;
+    // Four times as much for normals alone: a slope needs a wider base than a distance.
+    pass.radius = (precision == 0 ? 4 : 1) * options_.regression_radius;
     pass.steps = steps;
     pass.deviation = static_cast<float>(precision);
     pass.candidates = how;
