@@ -139,6 +139,18 @@ FN float confidence_of(float displacement, float support, float unexplained, flo
   return known / (1.0f + exponential(-log_odds));
 }
 
+// What a source shows of the point at inverse distance w, negative where it does not see it.
+FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
+  CameraParameters camera = PARAMETERS.cameras[source];
+  vec2 position;
+  vec3 direction = direction_in_source(pair_between(CONTEXT REFERENCE, source), ray, w);
+  if (!project_in_front(camera, model_of(CONTEXT camera), direction, w, position)) return MASKED_INTENSITY;
+  return sample_image(CONTEXT source, camera.size, texel_at(position, FILTER));
+}
+
+// Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the
+// reasons. With CHECK_FOR_VOTE the source that tells most and what it shows of the point stand for the difference and
+// the confidence, which cost more and are not asked for then.
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
@@ -172,9 +184,16 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       reasons |= REASON_INCONSISTENT;
     }
     if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
-    confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
-                               variance.x * min(held.w, 1.0f), support.y,
-                               structure_of_surroundings(CONTEXT pixel, variance.y));
+    if ((PASS.candidates & CHECK_FOR_VOTE) != 0u) {
+      vec2 velocity;
+      int source = telling_source(CONTEXT ray, w, velocity);
+      difference.x = float(source);
+      confidence = intensity_in_source(CONTEXT source, ray, w);
+    } else {
+      confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
+                                 variance.x * min(held.w, 1.0f), support.y,
+                                 structure_of_surroundings(CONTEXT pixel, variance.y));
+    }
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
 }

@@ -71,11 +71,12 @@
 #define CANDIDATE_SURROUNDINGS 12
 #define CANDIDATE_SOURCE_PLANE 13
 
-// Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane(), adopt_pixel() and
-// adopt_fill_pixel(), where it stands beside the reasons.
+// Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane(), adopt_pixel(),
+// check_pixel() and adopt_fill_pixel(), where it stands beside the reasons.
 #define INTERPOLATE_CUBIC 1u
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
+#define CHECK_FOR_VOTE 1u
 #define FILL_WITH_MATCHES (2u * REASON_FILLED)
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each

@@ -15,6 +15,14 @@
 #define EXPECTED_DIFFERENCE2 1e-4f
 // Random slot; the search and the regression use lower ones.
 #define VOTE_SLOT 72
+// Pixels around whose intensities tell the gain: radius and step of their grid, and the rounds over them.
+#define GAIN_RADIUS 20
+#define GAIN_STEP 10
+#define GAIN_ROUNDS 2
+// Intensity, in both images, that stands for a gain of one where nothing else tells it.
+#define GAIN_OF_ONE 0.01f
+// A difference of 1 / 32, eight grey levels, halves the weight.
+#define DOUBT_PER_DIFFERENCE 32.0f
 
 // The pixel whose plane is candidate i.
 FN ivec2 vote_candidate_at(CONTEXT_ARGUMENT ivec2 pixel, int i) {
@@ -31,11 +39,41 @@ FN float support_between(float w, float candidate, float scale) {
   return agreement * agreement;
 }
 
-// Inverse of the mean squared difference of intensity over the middle of the patch, noise included. It must not explain
-// a wrong plane by gain and offset, as a correlation of so few pixels could.
-FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
+// How many times brighter the reference is than the source around the pixel, for exposures and vignetting differ: from
+// the pixels that passed check_pixel() for repair, which has left what the source shows of them.
+FN float gain_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  float gain = 1.0f;
+  // What differs more than noise after the first round is not the same point.
+  for (int round = 0; round < GAIN_ROUNDS; ++round) {
+    float sum_a = GAIN_OF_ONE;
+    float sum_b = GAIN_OF_ONE;
+    for (int dy = -GAIN_RADIUS; dy <= GAIN_RADIUS; dy += GAIN_STEP) {
+      for (int dx = -GAIN_RADIUS; dx <= GAIN_RADIUS; dx += GAIN_STEP) {
+        ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+        if (!in_image(size, q)) continue;
+        vec4 checked = check_at(CONTEXT REFERENCE, q);
+        float a = intensity_at(CONTEXT REFERENCE, q);
+        float b = checked.z;
+        if (checked.w != 0.0f || int(checked.x) != source || min(a, b) < 0.0f) continue;
+        float doubt = (a - gain * b) * DOUBT_PER_DIFFERENCE;
+        float weight = round == 0 ? 1.0f : 1.0f / (1.0f + doubt * doubt);
+        sum_a += weight * a;
+        sum_b += weight * b;
+      }
+    }
+    gain = sum_a / sum_b;
+  }
+  return gain;
+}
+
+// Inverse of the mean squared difference of intensity over the middle of the patch, noise included, in units of the
+// darker image. It must not explain a wrong plane by a gain of its own, as a correlation of so few pixels could.
+FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, float gain) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
+  // Noise does not count for more where the source is the darker one.
+  float per_unit = 1.0f / max(gain, 1.0f);
   float n = 0.0f;
   float sum = 0.0f;
   PatchStart start;
@@ -47,7 +85,7 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
         float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + first + dx, pixel.y + dy));
         float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
         if (min(a, b) < 0.0f) continue;
-        float difference = min(abs(a - b), LARGEST_DIFFERENCE);
+        float difference = min(abs(a - gain * b) * per_unit, LARGEST_DIFFERENCE);
         n += 1.0f;
         sum += difference * difference;
       }
@@ -137,10 +175,11 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     // Where nothing competes, as on most surfaces, nothing needs to be sampled.
     if (count == 1) count = 0;
     float best = 0.0f;
+    float gain = count > 0 ? gain_around(CONTEXT source, pixel) : 1.0f;
     for (int k = 0; k < count; ++k) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
-      float score = votes[k] * likeness_of_middle(CONTEXT source, pixel, m);
+      float score = votes[k] * likeness_of_middle(CONTEXT source, pixel, m, gain);
       if (score > best) {
         best = score;
         prior = vec4(m, 1.0f);

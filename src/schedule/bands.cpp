@@ -23,17 +23,19 @@ long long neighbours_of_regression(const kernel::PassParameters& pass) {
 
 /// Of a dispatch, in samples; a kernel without patches may still look at every pixel's window.
 long long estimated_work(const Dispatch& dispatch, const KernelConstants& constants) {
+  const long long side = 2 * constants.window_radius + 1;
+  const long long of_windows = side * side * dispatch.pixels;
   switch (dispatch.kernel) {
     case Kernel::regress:
       return samples_of_neighbour * neighbours_of_regression(dispatch.pass) * dispatch.pixels;
     case Kernel::vote: {
-      const long long side = 2 * dispatch.pass.radius / VOTE_STEP + 1;
-      return dispatch.samples + samples_of_voter * side * side * dispatch.pixels;
+      const long long voters = 2 * dispatch.pass.radius / VOTE_STEP + 1;
+      return dispatch.samples + samples_of_voter * voters * voters * dispatch.pixels;
     }
-    default: {
-      const long long side = 2 * constants.window_radius + 1;
-      return dispatch.samples > 0 ? dispatch.samples : side * side * dispatch.pixels;
-    }
+    case Kernel::check:
+      return dispatch.samples + of_windows;
+    default:
+      return dispatch.samples > 0 ? dispatch.samples : of_windows;
   }
 }
 

@@ -167,7 +167,7 @@ class Builder {
   }
 
   Schedule finished() {
-    check();
+    check(0);
     if (options_.ambiguity_margin > 0) find_ambiguity();
     fill(options_.fill_radius, reason_no_ray);
     return std::move(schedule_);
@@ -212,11 +212,13 @@ class Builder {
         for (const Views views : launches(level, level > 0 ? at_once : one_by_one)) {
           measure(views);
           if (i == 0 && options_.subpixel_match) match_subpixel(views);
-          regress(views, precision_of_round(i), 0, level == 0 ? until_vote() : Kernel::adopt);
+          const bool last = i + 1 == options_.level_regressions[place];
+          // Costs are not needed before the last round, those of before lie near enough.
+          const Kernel adopt = level == 0 ? until_vote() : last ? Kernel::adopt : Kernel::adopt_point;
+          regress(views, precision_of_round(i), level > 0 && i > 0 ? HELD_UNSEEN : 0, adopt);
         }
         if (level > 0) continue;
-        repair();
-        vote();
+        repair_and_vote();
       }
     }
     if (options_.level_regressions.back() > 0) {
@@ -323,8 +325,7 @@ class Builder {
       regress(views_of(0), precision_of_round(i), how, last ? until_vote() : Kernel::adopt_point,
               warm_regression_steps());
     }
-    repair();
-    vote();
+    repair_and_vote();
   }
 
   void iterate(Views views, int iterations) {
@@ -435,7 +436,7 @@ class Builder {
   }
 
   /// Regressed planes get their costs when they have been voted on. Until then, pixels keep those
-  /// of the planes before, which lie near enough for the checks of repair().
+  /// of the planes before, which lie near enough to be checked.
   Kernel until_vote() const {
     return options_.vote_radius > 0 ? Kernel::adopt_point : Kernel::adopt;
   }
@@ -453,7 +454,12 @@ class Builder {
     add(Kernel::adopt, pass, views_of(0), 1);
   }
 
-  void check() { add(Kernel::check, pass_of(views_of(0)), views_of(0), 0); }
+  /// `how`: CHECK_FOR_VOTE, which samples one source once, or 0.
+  void check(unsigned how) {
+    kernel::PassParameters pass = pass_of(views_of(0));
+    pass.candidates = how;
+    add_with_samples(Kernel::check, pass, views_of(0), how == CHECK_FOR_VOTE ? 1 : 0);
+  }
 
   void find_ambiguity() {
     kernel::PassParameters pass = pass_of(views_of(0));
@@ -472,11 +478,12 @@ class Builder {
     add(Kernel::adopt_fill, pass, views_of(0), 1);
   }
 
-  /// Lets pixels that fail the checks take the planes around them.
-  void repair() {
-    if (options_.repair_radius == 0) return;
-    check();
+  /// Lets pixels that fail the checks take the planes around them, and then the elected ones.
+  void repair_and_vote() {
+    if (options_.repair_radius == 0 && options_.vote_radius == 0) return;
+    check(CHECK_FOR_VOTE);
     fill(options_.repair_radius, reason_no_ray | reason_no_overlap | FILL_WITH_MATCHES);
+    vote();
   }
 
   const Options& options_;

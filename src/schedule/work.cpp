@@ -124,7 +124,7 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::transfer_gather:
       return {seen | winner | plane, half_pixels, plane};
     case Kernel::check:
-      return {seen | plane, plane, checks};
+      return {seen | plane, dispatch.samples > 0 ? plane | half_pixels : plane, checks};
     case Kernel::ambiguity:
       return {seen | plane | checks, half_pixels, checks};
     case Kernel::interpolate:
@@ -152,7 +152,7 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::adopt_fill:
       return {prior | checks | seen, half_pixels, plane | checks};
     case Kernel::vote:
-      return {seen | plane, half_pixels, prior};
+      return {seen | plane | checks, half_pixels, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
     case Kernel::renew:

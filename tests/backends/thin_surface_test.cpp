@@ -30,8 +30,14 @@ RenderedPair render_poles() {
   return render(scene, demo_rig(size), 1);
 }
 
-TEST(ThinSurfaces, StayBeforeAWall) {
-  const RenderedPair pair = render_poles();
+/// How bright the source is, the reference being 1.
+class ThinSurfaces : public ::testing::TestWithParam<double> {};
+
+INSTANTIATE_TEST_SUITE_P(Exposures, ThinSurfaces, ::testing::Values(1, 0.7));
+
+TEST_P(ThinSurfaces, StayBeforeAWall) {
+  RenderedPair pair = render_poles();
+  pair.views[1].image.convertTo(pair.views[1].image, -1, GetParam());
   Options options = Options::preset_named("fast");
   options.min_distance = 0.5;
   options.max_distance = 20;

@@ -9,6 +9,7 @@
 #include "cpu/kernels.h"
 #include "schedule/schedule.h"
 #include "widestereo/rig.h"
+#include "widestereo/synthesis.h"
 
 namespace widestereo::test {
 
@@ -123,6 +124,19 @@ class KernelFixture {
         for (int x = 0; x < size.width; ++x) kernel::cpu::interpolate_pixel(context, {x, y});
       }
     }
+  }
+
+  /// Takes a rendered pair's images, the source's `exposure` times as bright; masked pixels stay
+  /// so.
+  void show(const RenderedPair& pair, double exposure = 1) {
+    for (std::size_t i = 0; i < pair.views.size(); ++i) {
+      cv::Mat grey;
+      cv::cvtColor(pair.views[i].image, grey, cv::COLOR_BGR2GRAY);
+      grey.convertTo(grey, CV_32FC1, (i == 0 ? 1 : exposure) / 255);
+      cv::Mat image = views_[i].image();
+      grey.copyTo(image, image >= 0);
+    }
+    interpolate();
   }
 
   /// Makes `view` the reference and every other view a source.

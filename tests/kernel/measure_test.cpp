@@ -2,10 +2,7 @@
 // Measures of planes held nearly right, on rendered images of a slanted plane.
 #include <gtest/gtest.h>
 
-#include <opencv2/imgproc.hpp>
-
 #include "kernel_fixture.h"
-#include "widestereo/synthesis.h"
 
 namespace widestereo::test {
 namespace {
@@ -19,16 +16,10 @@ class Measure : public ::testing::Test {
     const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
     const double offset = 2;
     wall_ = normal / offset;
-    const RenderedPair pair = render_plane(fixture_.rig(), normal, offset);
+    fixture_.show(render_plane(fixture_.rig(), normal, offset));
     for (int i = 0; i < 2; ++i) {
-      cv::Mat grey;
-      cv::cvtColor(pair.views[i].image, grey, cv::COLOR_BGR2GRAY);
-      grey.convertTo(grey, CV_32FC1, 1.0 / 255);
-      cv::Mat image = fixture_.view(i).image();
-      grey.copyTo(image, image >= 0);  // masked pixels stay masked
       fixture_.view(i).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
     }
-    fixture_.interpolate();
     fixture_.set_reference(0);
   }
 

@@ -249,7 +249,9 @@ TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
 /// Two views that agree on one plane everywhere.
 class AgreeingViews {
  public:
-  explicit AgreeingViews(const Options& options) : fixture(fisheye_rig(96), options) {
+  explicit AgreeingViews(const Options& options,
+                         const Eigen::Vector3d& plane_of_first = {0.05, 0.1, 0.5})
+      : fixture(fisheye_rig(96), options), first_(to_kernel(plane_of_first)) {
     for (int view = 0; view < 2; ++view) {
       const vec3 m = plane(view);
       fixture.view(view).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
@@ -258,8 +260,8 @@ class AgreeingViews {
 
   /// The plane m . X = 1 of view 0 in the frame of `view`.
   vec3 plane(int view) {
-    const vec3 m(0.05f, 0.1f, 0.5f);
-    return view == 0 ? m : kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m);
+    if (view == 0) return first_;
+    return kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], first_);
   }
 
   int reasons(ivec2 pixel) {
@@ -278,7 +280,29 @@ class AgreeingViews {
   }
 
   KernelFixture fixture;
+
+ private:
+  vec3 first_;
 };
+
+TEST(Checks, ForAVoteTellWhatTheSourceShowsOfThePoint) {
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.1, 0.2, 1).normalized();
+  AgreeingViews views(wide_range(), normal / 2);
+  KernelFixture& fixture = views.fixture;
+  fixture.show(render_plane(fixture.rig(), normal, 2), 0.5);
+  fixture.set_reference(0);
+  for (int x = 30; x < 66; x += 5) {
+    fixture.pass().candidates = 0;
+    ASSERT_EQ(views.reasons({x, 48}), 0);
+    const float displacement = fixture.view(0).checks(48, x)[1];
+    fixture.pass().candidates = CHECK_FOR_VOTE;
+    EXPECT_EQ(views.reasons({x, 48}), 0);
+    const cv::Vec4f check = fixture.view(0).checks(48, x);
+    EXPECT_EQ(check[0], 1) << "the source";
+    EXPECT_EQ(check[1], displacement);
+    EXPECT_NEAR(check[2], 0.5f * fixture.view(0).image().at<float>(48, x), 0.02);
+  }
+}
 
 TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {
   AgreeingViews views(wide_range());
