@@ -9,7 +9,7 @@
 #define SAME_DISPLACEMENT 0.06f
 // Displacement up to which candidates are the same rival.
 #define RIVAL_DISPLACEMENT 0.35f
-// Largest difference of intensity that counts: where exposures differ by more, all planes are alike.
+// Largest difference of intensity that counts: all that differ by more are alike.
 #define LARGEST_DIFFERENCE 0.08f
 // Square of the difference that noise alone leaves.
 #define EXPECTED_DIFFERENCE2 1e-4f
@@ -40,7 +40,7 @@ FN float support_between(float w, float candidate, float scale) {
 }
 
 // How many times brighter the reference is than the source around the pixel, for exposures and vignetting differ: from
-// the pixels that passed check_pixel() for repair, which has left what the source shows of them.
+// the pixels that passed check_pixel() for this vote, which has left what the source shows of them.
 FN float gain_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float gain = 1.0f;
