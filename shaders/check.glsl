@@ -141,11 +141,9 @@ FN float confidence_of(float displacement, float support, float unexplained, flo
 
 // What a source shows of the point at inverse distance w, negative where it does not see it.
 FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
-  CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
-  vec3 direction = direction_in_source(pair_between(CONTEXT REFERENCE, source), ray, w);
-  if (!project_in_front(camera, model_of(CONTEXT camera), direction, w, position)) return MASKED_INTENSITY;
-  return sample_image(CONTEXT source, camera.size, texel_at(position, FILTER));
+  if (!position_in_source(CONTEXT source, ray, w, position)) return MASKED_INTENSITY;
+  return sample_image(CONTEXT source, PARAMETERS.cameras[source].size, texel_at(position, FILTER));
 }
 
 // Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the

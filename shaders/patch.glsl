@@ -64,15 +64,19 @@ FN bool warp_pixel(CONTEXT_ARGUMENT PlaneWarp warp, CameraParameters camera, int
   return inside && in_image(size, pixel);
 }
 
+// Where the point at inverse distance w along a reference ray lands in the source; false where it cannot.
+FN bool position_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w, OUT(vec2) position) {
+  CameraParameters camera = PARAMETERS.cameras[source];
+  vec3 direction = direction_in_source(pair_between(CONTEXT REFERENCE, source), ray, w);
+  return project_in_front(camera, model_of(CONTEXT camera), direction, w, position);
+}
+
 // The pixel of the source in which the point lands; false where it lands outside.
 FN bool pixel_in_source(CONTEXT_ARGUMENT int source, vec3 ray, vec3 m, OUT(ivec2) q) {
-  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   vec2 position;
   q = ivec2(0, 0);
-  float w = dot(m, ray);
-  vec3 direction = direction_in_source(pair, ray, w);
-  if (!project_in_front(camera, model_of(CONTEXT camera), direction, w, position)) return false;
+  if (!position_in_source(CONTEXT source, ray, dot(m, ray), position)) return false;
   // Before the conversion, which is defined only for what an integer holds.
   if (!(position.x >= -0.5f && position.y >= -0.5f && position.x < float(camera.size.x) &&
         position.y < float(camera.size.y))) {
