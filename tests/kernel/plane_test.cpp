@@ -210,6 +210,107 @@ TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
   EXPECT_GT(carried_in(fixture.view(1).hypotheses), 0.99) << "surfaces continue into holes";
 }
 
+/// Warps planes from one view to another, or the same, whose pixels fetch theirs by `gather`.
+template <typename Gather>
+void transfer(KernelFixture& fixture, int from, int to, Gather gather) {
+  fixture.set_reference(to);
+  fixture.pass().other = from;
+  const auto context = fixture.context();
+  const auto run = [&](auto function, int over) {
+    const cv::Size size = fixture.view(over).rays.size();
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) function(context, ivec2(x, y));
+    }
+  };
+  run(kernel::cpu::transfer_clear_pixel, to);
+  run(kernel::cpu::transfer_nearest_pixel, from);
+  run(kernel::cpu::transfer_winner_pixel, from);
+  run(gather, to);
+}
+
+/// Share of the pixels in the middle that hold the plane m.
+double share_that_holds(const cv::Mat_<cv::Vec4f>& map, const vec3& m) {
+  int holding = 0;
+  int count = 0;
+  for (int y = map.rows / 4; y < map.rows * 3 / 4; ++y) {
+    for (int x = map.cols / 4; x < map.cols * 3 / 4; ++x, ++count) {
+      const cv::Vec4f& h = map(y, x);
+      holding += cv::norm(cv::Vec3f(h[0], h[1], h[2]) - cv::Vec3f(m.x, m.y, m.z)) < 1e-5;
+    }
+  }
+  return static_cast<double>(holding) / count;
+}
+
+TEST(Transfer, LeavesNoHolesInAViewThatSeesEverythingLarger) {
+  Rig rig = fisheye_rig(96);
+  rig.views[1].camera = fisheye_camera(160);
+  KernelFixture fixture(rig, wide_range());
+  const vec3 m(0.05f, 0.1f, 0.5f);
+  fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+  transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+  EXPECT_GT(
+      share_that_holds(fixture.view(1).hypotheses,
+                       kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m)),
+      0.99);
+}
+
+TEST(Transfer, OfSeveralPlanesTheNearestWins) {
+  KernelFixture fixture(fisheye_rig(96), wide_range());
+  const vec3 far(0.05f, 0.1f, 0.5f);
+  const vec3 near = 1.5f * far;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const vec3& m = (x + y) % 2 == 0 ? near : far;
+      fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, 0.1f);
+    }
+  }
+  transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+  EXPECT_GT(
+      share_that_holds(fixture.view(1).hypotheses,
+                       kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], near)),
+      0.95);
+}
+
+TEST(Transfer, WithoutMotionEveryPixelKeepsItsPlane) {
+  const Rig rig = fisheye_rig(96);
+  KernelFixture fixture(rig, wide_range("fast"));
+  set_motion(fixture.schedule(), rig, Eigen::Isometry3d::Identity(), 1);
+  cv::Mat_<cv::Vec4f>& planes = fixture.view(0).hypotheses;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const cv::Vec4f r = fixture.view(0).rays(y, x);
+      const float w = 0.3f + 0.001f * static_cast<float>((7 * x + 13 * y) % 50);
+      planes(y, x) = cv::Vec4f(w * r[0], w * r[1], w * r[2], 0.1f);
+    }
+  }
+  transfer(fixture, 0, 0, kernel::cpu::transfer_keep_pixel);
+  int lost = 0;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      if (fixture.view(0).rays(y, x)[3] == 0) continue;
+      const cv::Vec4f& moved = fixture.view(0).priors(y, x);
+      const cv::Vec4f difference = moved - planes(y, x);
+      lost += cv::norm(cv::Vec3f(difference[0], difference[1], difference[2])) > 1e-6;
+    }
+  }
+  EXPECT_EQ(lost, 0);
+}
+
+TEST(Transfer, SurfacesContinueIntoHolesFromEveryDirection) {
+  KernelFixture fixture(fisheye_rig(96), wide_range("fast"));
+  fixture.set_reference(0);
+  const vec3 m(0.05f, 0.1f, 0.5f);
+  for (int i = 0; i < 9; ++i) {
+    if (i == 4) continue;
+    fixture.view(0).priors.setTo(cv::Scalar::all(0));
+    const int x = 48 + 8 * (i % 3 - 1);
+    const int y = 48 + 8 * (i / 3 - 1);
+    fixture.view(0).priors(y, x) = cv::Vec4f(m.x, m.y, m.z, 1);
+    kernel::cpu::renew_pixel(fixture.context(), {48, 48});
+    EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[2], m.z) << "from " << x << ", " << y;
+  }
+}
+
 TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
   Options options;
   options.min_distance = 0.2;
@@ -237,7 +338,12 @@ TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
   check = fixture.view(0).checks(48, 48);
   EXPECT_NEAR(check[0], 0.05, 0.003);
   EXPECT_EQ(static_cast<int>(check[3]), REASON_INCONSISTENT);
-  EXPECT_LT(check[2], consistent);
+  fill(1, 3 * moved);
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  check = fixture.view(0).checks(48, 48);
+  EXPECT_GT(check[1], 2);
+  const auto odds = [](float confidence) { return confidence / (1 - confidence); };
+  EXPECT_LT(odds(check[2]), 0.5f * odds(consistent)) << "pixels off";
 
   fixture.view(0).hypotheses.setTo(cv::Scalar(0, 0, 0, 2));
   kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
@@ -246,13 +352,14 @@ TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
   EXPECT_EQ(static_cast<int>(fixture.view(0).checks(0, 0)[3]), REASON_NO_RAY);
 }
 
-/// Two views that agree on one plane everywhere.
+/// Views, two unless a rig is given, that agree on one plane everywhere.
 class AgreeingViews {
  public:
   explicit AgreeingViews(const Options& options,
-                         const Eigen::Vector3d& plane_of_first = {0.05, 0.1, 0.5})
-      : fixture(fisheye_rig(96), options), first_(to_kernel(plane_of_first)) {
-    for (int view = 0; view < 2; ++view) {
+                         const Eigen::Vector3d& plane_of_first = {0.05, 0.1, 0.5},
+                         const Rig& rig = fisheye_rig(96))
+      : fixture(rig, options), first_(to_kernel(plane_of_first)) {
+    for (int view = 0; view < static_cast<int>(rig.views.size()); ++view) {
       const vec3 m = plane(view);
       fixture.view(view).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
     }
@@ -261,7 +368,7 @@ class AgreeingViews {
   /// The plane m . X = 1 of view 0 in the frame of `view`.
   vec3 plane(int view) {
     if (view == 0) return first_;
-    return kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], first_);
+    return kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[view], first_);
   }
 
   int reasons(ivec2 pixel) {
@@ -284,6 +391,110 @@ class AgreeingViews {
  private:
   vec3 first_;
 };
+
+/// Pixels that the source sees the point at `ray` / w move per unit of w.
+double pixels_per_inverse_distance(const View& source, const View& reference,
+                                   const Eigen::Vector3d& ray, double w) {
+  const Eigen::Isometry3d motion = source_from_reference(source, reference);
+  constexpr double step = 1e-4;
+  Eigen::Vector2d nearer;
+  Eigen::Vector2d farther;
+  EXPECT_TRUE(project(source.camera, motion * (ray / (w + step)), nearer));
+  EXPECT_TRUE(project(source.camera, motion * (ray / (w - step)), farther));
+  return (nearer - farther).norm() / (2 * step);
+}
+
+TEST(Checks, RejectFromEachOptionsLimitOn) {
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  const cv::Point pixel(28, 66);  // off both axes
+  const Options generous = [] {
+    Options options = wide_range();
+    options.min_texture = options.min_parallax = options.min_support = 0;
+    options.max_cost = 2;
+    options.max_tilt = 90;
+    options.consistency_relative = options.consistency_pixels = 1000;
+    return options;
+  }();
+  const Rig rig = fisheye_rig(96);
+  constexpr double nearer = 1.05;  // what the source holds
+  const auto reasons = [&](double Options::*limit, double value, bool source_has_planes = true) {
+    Options options = generous;
+    options.*limit = value;
+    AgreeingViews views(options, m);
+    const vec3 held = static_cast<float>(nearer) * views.plane(1);
+    views.fixture.view(1).hypotheses.setTo(
+        cv::Scalar(held.x, held.y, held.z, source_has_planes ? 0.1f : INVALID_COST));
+    return views.reasons({pixel.x, pixel.y});
+  };
+  Eigen::Vector3d ray;
+  ASSERT_TRUE(unproject(rig.views[0].camera, {pixel.x, pixel.y}, ray));
+  const double w = m.dot(ray);
+
+  AgreeingViews views(generous, m);
+  constexpr int radius = 5;  // of the patch
+  cv::Scalar mean;
+  cv::Scalar texture;
+  cv::meanStdDev(views.fixture.view(0).image()(
+                     cv::Rect(pixel.x - radius, pixel.y - radius, 2 * radius + 1, 2 * radius + 1)),
+                 mean, texture);
+  const double parallax = pixels_per_inverse_distance(rig.views[1], rig.views[0], ray, w) *
+                          (1 / generous.min_distance - 1 / generous.max_distance);
+  const double tilt = std::acos(w / m.norm()) * 180 / CV_PI;
+  // Where the source's plane puts the point that both see in the same direction of the source.
+  const Eigen::Isometry3d motion = source_from_reference(rig.views[1], rig.views[0]);
+  const Eigen::Vector3d of_source = motion * (ray / w) / nearer;
+  Eigen::Vector2d back;
+  ASSERT_TRUE(project(rig.views[0].camera, motion.inverse() * of_source, back));
+  const double displacement = (back - Eigen::Vector2d(pixel.x, pixel.y)).norm();
+
+  struct Limit {
+    double Options::*option;
+    double truth;
+    bool is_least;
+    int reason;
+    double tolerance;
+  };
+  for (const auto& [option, truth, is_least, reason, tolerance] :
+       {Limit{&Options::min_texture, 255 * texture[0], true, REASON_NO_TEXTURE, 0.01},
+        {&Options::max_cost, 0.1, false, REASON_HIGH_COST, 0.01},
+        {&Options::min_parallax, parallax, true, REASON_LOW_PARALLAX, 0.1},
+        {&Options::max_tilt, tilt, false, REASON_TILT, 0.01},
+        {&Options::consistency_relative, 1 - 1 / nearer, false, REASON_INCONSISTENT, 0.01},
+        {&Options::consistency_pixels, displacement, false, REASON_INCONSISTENT, 0.01}}) {
+    EXPECT_EQ(reasons(option, truth * (1 - tolerance)), is_least ? 0 : reason) << reason;
+    EXPECT_EQ(reasons(option, truth * (1 + tolerance)), is_least ? reason : 0) << reason;
+  }
+  EXPECT_EQ(reasons(&Options::consistency_pixels, 0, false), REASON_UNCHECKED);
+}
+
+TEST(Checks, TheBestOfSeveralSourcesCounts) {
+  Rig rig = fisheye_rig(96);
+  rig.views.push_back(rig.views[1]);
+  rig.views[2].name = "cam2";
+  rig.views[1].world_from_camera.translation() *= 0.1;
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  Eigen::Vector3d ray;
+  ASSERT_TRUE(unproject(rig.views[0].camera, {48, 48}, ray));
+  Options options = wide_range();
+  options.min_parallax = 0.5 *
+                         pixels_per_inverse_distance(rig.views[2], rig.views[0], ray, m.dot(ray)) *
+                         (1 / options.min_distance - 1 / options.max_distance);
+  for (const char* far : {"last", "first"}) {
+    SCOPED_TRACE(far);
+    AgreeingViews views(options, m, rig);
+    EXPECT_EQ(views.reasons({48, 48}), 0) << "parallax";
+    for (const int wrong : {1, 2}) {
+      cv::Mat planes = views.fixture.view(wrong).hypotheses;
+      const cv::Mat right = planes.clone();
+      planes *= 1.2;
+      EXPECT_EQ(views.reasons({48, 48}), 0) << "cam" << wrong << " disagrees";
+      right.copyTo(planes);
+    }
+    for (const int view : {1, 2}) views.fixture.view(view).hypotheses *= 1.2;
+    EXPECT_EQ(views.reasons({48, 48}), REASON_INCONSISTENT);
+    std::swap(rig.views[1], rig.views[2]);
+  }
+}
 
 TEST(Checks, ForAVoteTellWhatTheSourceShowsOfThePoint) {
   const Eigen::Vector3d normal = Eigen::Vector3d(0.1, 0.2, 1).normalized();
@@ -358,6 +569,14 @@ TEST(Checks, AgreementOnGradientsOfBrightnessIsNotCertain) {
   }
   cv::RNG(1).fill(image, cv::RNG::NORMAL, 0.5, 0.06);
   EXPECT_GT(mean_confidence(), 0.95 * textured) << "texture as fine as noise";
+  for (const int slope : {-1, 1}) {
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        image.at<float>(y, x) = static_cast<float>(0.5 + 0.1 * std::sin(0.4 * (x + slope * y)));
+      }
+    }
+    EXPECT_GT(mean_confidence(), 0.95 * textured) << "stripes along either diagonal";
+  }
 }
 
 TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
@@ -377,6 +596,42 @@ TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
   EXPECT_EQ(added_at_cost(0.1, 6), 0);
   EXPECT_EQ(added_at_cost(1.9, 0), 0) << "nowhere else";
   EXPECT_EQ(added_at_cost(2, 6), 0) << "no plane";
+}
+
+TEST(Checks, ABetterMatchElsewhereLiesToEitherSideAndMatchesBetterByTheMargin) {
+  Options options = wide_range("fast");
+  options.ambiguity_margin = 0.2;
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+  const Eigen::Vector3d wall = normal / 2;
+  KernelFixture fixture(fisheye_rig(128), options);
+  fixture.show(render_plane(fixture.rig(), normal, 2));
+  fixture.set_reference(0);
+  // Share of the pixels that find the wall, held that many source pixels too near.
+  const auto share = [&](double pixels, float cost) {
+    constexpr int places = 6;
+    fixture.pass().places = places;
+    int ambiguous = 0;
+    int count = 0;
+    for (int y = 34; y < 94; y += 5) {
+      for (int x = 34; x < 94; x += 5, ++count) {
+        Eigen::Vector3d ray;
+        EXPECT_TRUE(unproject(fixture.rig().views[0].camera, {x, y}, ray));
+        const double w = wall.dot(ray);
+        const double speed =
+            pixels_per_inverse_distance(fixture.rig().views[1], fixture.rig().views[0], ray, w);
+        const vec3 m = to_kernel((1 + pixels / speed / w) * wall);
+        fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, cost);
+        fixture.view(0).checks(y, x) = cv::Vec4f(0, 0, 1, 0);
+        kernel::cpu::ambiguity_pixel(fixture.context(), {x, y});
+        ambiguous += fixture.view(0).checks(y, x)[3] == REASON_AMBIGUOUS;
+      }
+    }
+    return static_cast<double>(ambiguous) / count;
+  };
+  for (const double pixels : {-4.0, -2.0, 2.0, 4.0}) {
+    EXPECT_GT(share(pixels, 0.5f), 0.9) << pixels << " px";
+    EXPECT_EQ(share(pixels, 0.15f), 0) << pixels << " px, less than the margin better";
+  }
 }
 
 TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
@@ -416,6 +671,72 @@ TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
   EXPECT_EQ(static_cast<int>(fill({47, 48})[3]), REASON_HIGH_COST) << "too far away";
 }
 
+/// A rejected pixel in the middle of others, and what of its surroundings is accepted.
+class FillOfAPixel : public ::testing::Test {
+ protected:
+  FillOfAPixel() : views_(wide_range()), m_(views_.plane(0)) {
+    KernelFixture& fixture = views_.fixture;
+    fixture.view(0).image().setTo(0.5);
+    fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0, REASON_HIGH_COST));
+    fixture.pass().radius = 10;
+    fixture.pass().candidates = REASON_NO_RAY;
+  }
+
+  /// A pixel, from the rejected one, that holds a multiple of the plane and is accepted.
+  void accept(int dx, int dy, float factor, float intensity = 0.5f) {
+    ViewMemory& view = views_.fixture.view(0);
+    view.hypotheses(y + dy, x + dx) = cv::Vec4f(factor * m_.x, factor * m_.y, factor * m_.z, 0.1f);
+    view.checks(y + dy, x + dx) = cv::Vec4f(0, 0, 0.9f, 0);
+    view.image()(y + dy, x + dx) = intensity;
+  }
+
+  /// The multiple that the pixel would take over; 0 where there is none.
+  float filled() {
+    kernel::cpu::fill_pixel(views_.fixture.context(), {x, y});
+    return views_.fixture.view(0).priors(y, x)[2] / m_.z;
+  }
+
+  using ViewMemory = kernel::cpu::ViewMemory;
+  static constexpr int x = 48;
+  static constexpr int y = 48;
+  AgreeingViews views_;
+  vec3 m_;
+};
+
+TEST_F(FillOfAPixel, LooksEquallyFarInEightDirections) {
+  for (int i = 0; i < 9; ++i) {
+    const int dx = i % 3 - 1;
+    const int dy = i / 3 - 1;
+    if (dx == 0 && dy == 0) continue;
+    const int reach = dx != 0 && dy != 0 ? 7 : 10;  // the same circle
+    for (const int far : {reach, reach + 1}) {
+      views_.fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0, REASON_HIGH_COST));
+      accept(far * dx, far * dy, 2);
+      EXPECT_EQ(filled(), far == reach ? 2 : 0) << dx << ", " << dy;
+    }
+  }
+}
+
+TEST_F(FillOfAPixel, TakesTheMedianOfASurface) {
+  accept(-3, 0, 1);
+  accept(5, 0, 1.01f);
+  accept(0, 7, 1.02f);
+  EXPECT_FLOAT_EQ(filled(), 1.01f);
+}
+
+TEST_F(FillOfAPixel, GoesByIntensity) {
+  accept(-3, 0, 1, 0.8f);
+  accept(5, 0, 3, 0.5f);
+  EXPECT_FLOAT_EQ(filled(), 3) << "the nearer surface, which looks alike";
+}
+
+TEST_F(FillOfAPixel, TakesNoPlaneThatIsOutOfRange) {
+  accept(-3, 0, 1);
+  accept(5, 0, 3);
+  views_.fixture.schedule().parameters.range.z = m_.z * 2;
+  EXPECT_FLOAT_EQ(filled(), 3);
+}
+
 TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
   Options options = wide_range();
   AgreeingViews views(options);
@@ -447,11 +768,13 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   const ivec2 pixel(48, 48);
   const cv::Vec4f r = fixture.view(0).rays(48, 48);
   const vec3 ray(r[0], r[1], r[2]);
-  const auto chosen_distance = [&](double held_distance, double held_cost, double distance) {
+  // `small`: difference of inverse distance up to which planes are as far as each other.
+  const auto chosen_distance = [&](double held_distance, double held_cost, double distance,
+                                   float small = 0) {
     const float w = static_cast<float>(1 / held_distance);
     const kernel::vec4 held(w * ray, static_cast<float>(held_cost));
-    const kernel::vec4 better = kernel::cpu::better_of(fixture.context(), pixel, ray, held,
-                                                       static_cast<float>(1 / distance) * ray, 0);
+    const kernel::vec4 better = kernel::cpu::better_of(
+        fixture.context(), pixel, ray, held, static_cast<float>(1 / distance) * ray, small);
     return static_cast<double>(1 / (better.x * ray.x + better.y * ray.y + better.z * ray.z));
   };
   for (int view = 0; view < 2; ++view) fixture.view(view).image().setTo(0.5);
@@ -459,6 +782,8 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   EXPECT_NEAR(chosen_distance(2, NO_INFORMATION_COST, 90), 90, 0.01) << "nothing to see: far";
   EXPECT_NEAR(chosen_distance(90, NO_INFORMATION_COST, 2), 90, 0.01);
   EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4) << "a difference in cost outweighs it";
+  EXPECT_NEAR(chosen_distance(30, NO_INFORMATION_COST, 40), 40, 0.01);
+  EXPECT_NEAR(chosen_distance(30, NO_INFORMATION_COST, 40, 0.01f), 30, 0.01) << "as good as there";
 
   // On a gradient of brightness every plane matches well.
   for (int view = 0; view < 2; ++view) {
