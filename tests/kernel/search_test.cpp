@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: MIT
+// What the adaptive search tries, one kind of candidate at a time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+
+#include "kernel_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using kernel::ivec2;
+using kernel::vec3;
+
+constexpr int size = 96;
+constexpr int middle = size / 2;
+
+Eigen::Vector3d to_eigen(const vec3& v) { return Eigen::Vector3f(v.x, v.y, v.z).cast<double>(); }
+
+class Candidates : public ::testing::Test {
+ protected:
+  Candidates() : fixture_(fisheye_rig(size), wide_range("fast")) { fixture_.set_reference(0); }
+
+  vec3 ray(ivec2 pixel) {
+    const cv::Vec4f r = fixture_.view(0).rays(pixel.y, pixel.x);
+    return {r[0], r[1], r[2]};
+  }
+  void hold(int view, const vec3& m) {
+    fixture_.view(view).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+  }
+  /// From the plane that the pixel holds; `speed`: source pixels per unit of inverse distance.
+  vec3 candidate(ivec2 pixel, const vec3& held, int kind, float speed = 3) {
+    return kernel::cpu::adaptive_candidate(fixture_.context(), pixel, ray(pixel), held, speed, 1,
+                                           kind);
+  }
+
+  KernelFixture fixture_;
+  const vec3 wall_{0.05f, 0.1f, 0.5f};
+};
+
+TEST_F(Candidates, OfStripsLieOnFourSidesOfThePixel) {
+  constexpr int reach = 30;
+  std::array<std::set<std::pair<int, int>>, STRIPS> found;
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      fixture_.view(0).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
+      fixture_.view(0).hypotheses(middle + dy, middle + dx) = cv::Vec4f(0, 0, 1, 0.1f);
+      for (int strip = 0; strip < STRIPS; ++strip) {
+        if (candidate({middle, middle}, wall_, strip).z == 0) continue;
+        // As if the strip led to the right.
+        const bool upright = strip % 4 == STRIP_UP || strip % 4 == STRIP_DOWN;
+        const bool outwards = strip % 4 == STRIP_DOWN || strip % 4 == STRIP_RIGHT;
+        const int along = (outwards ? 1 : -1) * (upright ? dy : dx);
+        found.at(static_cast<std::size_t>(strip)).insert({along, upright ? dx : dy});
+      }
+    }
+  }
+  const std::set<std::pair<int, int>> v = {{1, 0}, {2, -1}, {2, 1}, {3, -2},
+                                           {3, 2}, {4, -3}, {4, 3}};
+  std::set<std::pair<int, int>> line;
+  for (int along = 3; along <= 23; along += 2) line.insert({along, 0});
+  for (std::size_t strip = 0; strip < STRIPS; ++strip) {
+    EXPECT_EQ(found.at(strip), strip < NEAR_STRIPS ? v : line) << strip;
+  }
+}
+
+TEST_F(Candidates, OfSurroundingsAreParallelToThePointsAround) {
+  hold(0, wall_);
+  const ivec2 pixel(60, 40);
+  const vec3 held = (dot(wall_, ray(pixel))) * ray(pixel);
+  const Eigen::Vector3d found = to_eigen(candidate(pixel, held, CANDIDATE_SURROUNDINGS));
+  EXPECT_LT((found - to_eigen(wall_)).norm(), 1e-4);
+}
+
+TEST_F(Candidates, OfTheSourceAreItsPlanesInTheReferencesFrame) {
+  hold(1, kernel::cpu::plane_in_source(fixture_.schedule().parameters.pairs[1], wall_));
+  const Eigen::Vector3d found = to_eigen(candidate({60, 40}, 1.1f * wall_, CANDIDATE_SOURCE_PLANE));
+  EXPECT_LT((found - to_eigen(wall_)).norm(), 1e-5);
+}
+
+TEST(TellingSource, IsTheFastestOfThoseThatSeeThePoint) {
+  Rig rig = fisheye_rig(size);
+  rig.views.push_back(rig.views[1]);
+  rig.views[2].name = "cam2";
+  rig.views[1].world_from_camera.translation() *= 0.5;
+  KernelFixture fixture(rig, wide_range("fast"));
+  fixture.set_reference(0);
+  const cv::Vec4f r = fixture.view(0).rays(middle, middle);
+  const auto found = [&] {
+    kernel::vec2 velocity;
+    return kernel::cpu::telling_source(fixture.context(), {r[0], r[1], r[2]}, 0.5f, velocity);
+  };
+  EXPECT_EQ(found(), 2);
+  kernel::CameraParameters& fastest = fixture.schedule().parameters.cameras[2];
+  fastest.size.x = 1;
+  EXPECT_EQ(found(), 1) << "the other one does not see it";
+  fixture.schedule().parameters.cameras[1].size.x = 1;
+  EXPECT_EQ(found(), 2) << "nor does this one";
+}
+
+/// Lowest, mean and highest value over many pixels.
+struct Spread {
+  double low = 1e9, mean = 0, high = -1e9;
+  int count = 0;
+  void add(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+    mean += (value - mean) / ++count;
+  }
+};
+
+TEST_F(Candidates, AreDrawnFromAroundWhatIsHeldToEitherSide) {
+  constexpr double speed = 3;
+  constexpr double pixels = 0.5;
+  constexpr double turn = 0.25;
+  fixture_.pass().step_pixels = pixels;
+  fixture_.pass().step_normal = turn;
+  const kernel::vec4 range = fixture_.schedule().parameters.range;
+  const double least = static_cast<double>(range.z);
+  const double most = static_cast<double>(range.w);
+  Spread moved;
+  Spread anywhere;
+  std::array<Spread, 3> turned;
+  for (int y = 24; y < 72; ++y) {
+    for (int x = 24; x < 72; ++x) {
+      const Eigen::Vector3d r = to_eigen(ray({x, y}));
+      const Eigen::Vector3d held = to_eigen(wall_);
+      const auto drawn = [&](int kind) {
+        return to_eigen(candidate({x, y}, wall_, kind, static_cast<float>(speed)));
+      };
+      const Eigen::Vector3d distance = drawn(CANDIDATE_INVERSE_DISTANCE);
+      moved.add((distance - held).dot(r) * speed);
+      EXPECT_LT(distance.normalized().cross(held.normalized()).norm(), 1e-5);
+      const Eigen::Vector3d random = drawn(CANDIDATE_RANDOM_DISTANCE);
+      anywhere.add((random.dot(r) - least) / (most - least));
+      EXPECT_LT(random.normalized().cross(held.normalized()).norm(), 1e-5);
+      const Eigen::Vector3d normal = drawn(CANDIDATE_NORMAL);
+      EXPECT_NEAR(normal.dot(r), held.dot(r), 1e-5);
+      // Scaled so that what was added to the unit normal shows, but for its part along the normal.
+      const Eigen::Vector3d n = held.normalized();
+      const Eigen::Vector3d across = normal / normal.dot(n) - n;
+      for (int i = 0; i < 3; ++i) turned.at(static_cast<std::size_t>(i)).add(across[i]);
+    }
+  }
+  EXPECT_NEAR(moved.low, -pixels, 0.01);
+  EXPECT_NEAR(moved.mean, 0, 0.03);
+  EXPECT_NEAR(moved.high, pixels, 0.01);
+  EXPECT_NEAR(anywhere.low, 0, 0.01);
+  EXPECT_NEAR(anywhere.mean, 0.5, 0.03);
+  EXPECT_NEAR(anywhere.high, 1, 0.01);
+  // Scaling lengthens what is added to a normal that gets shorter.
+  for (const Spread& axis : {turned[0], turned[1]}) {
+    EXPECT_GT(-axis.low, 0.9 * turn);
+    EXPECT_LT(-axis.low, 1.6 * turn);
+    EXPECT_NEAR(axis.mean, 0, 0.1 * turn);
+    EXPECT_GT(axis.high, 0.9 * turn);
+    EXPECT_LT(axis.high, 1.6 * turn);
+  }
+}
+
+}  // namespace
+}  // namespace widestereo::test
