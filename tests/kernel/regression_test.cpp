@@ -58,11 +58,12 @@ class Regression : public ::testing::Test {
   }
 
   /// m of the regressed plane; zero where there is none.
-  Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision, int steps = 4) {
+  Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision, int steps = 4,
+                            unsigned how = 0) {
     fixture_.pass().radius = radius;
     fixture_.pass().steps = steps;
     fixture_.pass().deviation = static_cast<float>(precision);
-    fixture_.pass().candidates = 0;
+    fixture_.pass().candidates = how;
     kernel::cpu::regress_pixel(fixture_.context(), pixel);
     const cv::Vec4f prior = fixture_.view(0).priors(pixel.y, pixel.x);
     return {prior[0], prior[1], prior[2]};
@@ -163,6 +164,65 @@ TEST_F(Regression, FillsWhatWasNotMeasuredFromAround) {
   EXPECT_EQ(regressed(pixel, 18, 0.015), Eigen::Vector3d::Zero()) << "nothing to fill from";
 }
 
+TEST_F(Regression, AtTheEdgeOfWhatWasMeasuredIsNoLessTilted) {
+  const Eigen::Vector3d tilted(0.3, 0.4, 0.5);
+  const ivec2 pixel(48, 48);
+  for (const cv::Rect& weak :
+       {cv::Rect(0, 0, 48, size), cv::Rect(0, 0, size, 48), cv::Rect(49, 0, size - 49, size),
+        cv::Rect(0, 49, size, size - 49)}) {
+    measure([&](int) { return tilted; }, 0.005, 0);
+    for (cv::Vec4f& check : fixture_.view(0).checks) check[0] = 0.05f * 0.05f;
+    fixture_.view(0).checks(weak).setTo(cv::Scalar(UNMEASURED_VARIANCE, speed, 0, grey));
+    const float w = static_cast<float>(tilted.dot(ray(pixel)));
+    fixture_.view(0).hypotheses(pixel.y, pixel.x) = cv::Vec4f(0, 0, w, 0.1f);
+    EXPECT_LT(displacement(pixel, regressed(pixel, 18, 0.05), tilted), 0.012) << weak;
+  }
+}
+
+TEST_F(Regression, WeighsByThePrecisionOfInverseDistances) {
+  // Every other column moves a tenth as fast in the source, and is as wrong in pixels.
+  constexpr float share = 0.1f;
+  measure([](int) { return wall; }, 0.1, 0.1);
+  for (int x = 0; x < size; x += 2) {
+    for (int y = 0; y < size; ++y) {
+      cv::Vec4f& check = fixture_.view(0).checks(y, x);
+      const float truth = static_cast<float>(wall.dot(ray({x, y})));
+      check[2] = truth + (check[2] - truth) / share;
+      check[1] *= share;
+    }
+  }
+  EXPECT_LT(over_pixels(25, 71,
+                        [&](ivec2 pixel) {
+                          return displacement(pixel, regressed(pixel, 12, 1e-6, 12), wall);
+                        }),
+            0.02);
+}
+
+TEST_F(Regression, GoesByIntensityWhereSurfacesLieNearEachOther) {
+  const auto step = [](int x) -> Eigen::Vector3d { return x < 48 ? wall : 1.3 * wall; };  // 0.45 px
+  measure(step, 0.05, 0.1);
+  for (cv::Vec4f& check : fixture_.view(0).checks) check[0] = 0.3f * 0.3f;
+  for (int x = 48; x < size; ++x) {
+    for (int y = 0; y < size; ++y) fixture_.view(0).checks(y, x)[3] = grey + 0.3f;
+  }
+  EXPECT_LT(over_pixels(42, 53,
+                        [&](ivec2 pixel) {
+                          return displacement(pixel, regressed(pixel, 18, 0.015), step(pixel.x));
+                        }),
+            0.05);
+}
+
+TEST_F(Regression, DoesNotBlendSurfacesThatAreMeasuredBadly) {
+  const auto step = [](int x) -> Eigen::Vector3d { return x < 48 ? wall : 3 * wall; };  // 3 px
+  measure(step, 0.05, 0.1);
+  for (cv::Vec4f& check : fixture_.view(0).checks) check[0] = 1;
+  EXPECT_LT(over_pixels(42, 53,
+                        [&](ivec2 pixel) {
+                          return displacement(pixel, regressed(pixel, 18, 0.015), step(pixel.x));
+                        }),
+            0.3);
+}
+
 TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {
   const ivec2 pixel(48, 48);
   const cv::Vec4f held(0, 0, 0.5f, 0.1f);
@@ -174,6 +234,9 @@ TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {
     return fixture_.view(0).hypotheses(pixel.y, pixel.x);
   };
   EXPECT_EQ(adopted(), cv::Vec4f(0, 0, 0.6f, 0.1f));
+  EXPECT_FLOAT_EQ(fixture_.view(0).checks(pixel.y, pixel.x)[2],
+                  static_cast<float>(0.6 * ray(pixel).z()))
+      << "the measure follows";
   fixture_.schedule().parameters.cameras[1].size.x = 1;
   EXPECT_EQ(adopted(), held);
 }
@@ -188,6 +251,21 @@ TEST_F(Regression, OfNormalsAloneKeepsDistancesAndUsesAllOfAPlane) {
     return degrees_between(found, wall);
   });
   EXPECT_LT(error, 1.5);
+}
+
+TEST_F(Regression, OfBothTakesNormalsFromAWiderSurfaceThanDistances) {
+  measure([](int) { return wall; }, 0.05, 0.05);
+  const auto normal_error = [&](unsigned how) {
+    return over_pixels(32, 64, [&](ivec2 pixel) {
+      return degrees_between(regressed(pixel, 32, 0.02, 4, how), wall);
+    });
+  };
+  EXPECT_LT(normal_error(REGRESS_NORMALS), 0.5 * normal_error(0));
+  for (int x = 32; x <= 64; ++x) {
+    const Eigen::Vector3d r = ray({x, 48});
+    EXPECT_NEAR(regressed({x, 48}, 32, 0.02, 4, REGRESS_NORMALS).dot(r),
+                regressed({x, 48}, 32, 0.02, 4, 0).dot(r), 1e-6);
+  }
 }
 
 TEST_F(Regression, OfNormalsAloneStopsAtTheEndOfASmallSurface) {
