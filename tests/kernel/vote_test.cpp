@@ -2,6 +2,8 @@
 // The vote of the surroundings on maps with two known surfaces.
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "kernel_fixture.h"
 
 namespace widestereo::test {
@@ -85,6 +87,36 @@ TEST_F(Vote, PixelsWithoutAPlaneNeitherVoteNorStand) {
   EXPECT_EQ(elected(edge + 5), 0) << "has none itself";
 }
 
+TEST_F(Vote, NearPlanesCountForMoreThanMoreOfThemFarAway) {
+  for (int view = 0; view < 2; ++view) fixture_.view(view).image().setTo(bright);
+  fixture_.interpolate();
+  hold(0, size, near_plane);
+  constexpr int radius = 5;  // 121 of 289 pixels
+  const cv::Rect around(70 - radius, size / 2 - radius, 2 * radius + 1, 2 * radius + 1);
+  fixture_.view(0).hypotheses(around).setTo(cv::Scalar(0, 0, far_plane, 0.2));
+  fixture_.view(0).hypotheses(size / 2, 70) = cv::Vec4f(0, 0, 1, 0.2f);
+  EXPECT_EQ(elected(70), far_plane);
+}
+
+TEST_F(Vote, WhatIsNotSeenIsAsUnlikeAsCanBe) {
+  const auto likeness = [&](float plane, float gain) {
+    return kernel::cpu::likeness_of_middle(fixture_.context(), 1, {48, 48}, {0, 0, plane}, gain);
+  };
+  for (const auto& [reference, source, gain] :
+       {std::tuple(0.4f, 0.38f, 1.0f), {0.8f, 0.38f, 2.0f}}) {
+    fixture_.view(0).image().setTo(reference);
+    fixture_.view(1).image().setTo(source);
+    fixture_.interpolate();
+    EXPECT_NEAR(likeness(far_plane, gain), 2000, 20) << "of differences in the darker image";
+  }
+  fixture_.view(1).image().setTo(0);
+  fixture_.interpolate();
+  const float least = likeness(far_plane, 1);
+  fixture_.view(1).image().setTo(MASKED_INTENSITY);
+  fixture_.interpolate();
+  EXPECT_FLOAT_EQ(likeness(far_plane, 1), least);
+}
+
 TEST_F(Vote, ElectsNoPlaneThatIsOutOfRange) {
   fixture_.schedule().parameters.range.z = 1;  // 1 m at most
   hold(edge, edge + 2, near_plane);
@@ -97,9 +129,9 @@ TEST_F(Vote, WorksAtTheImagesEdge) {
 }
 
 /// Share of the pixels that elect a textured wall's plane where most planes around are twice as
-/// near. The source is `exposure` times as bright, which it `shows` pixels that passed the checks;
-/// every fifth sees another place there.
-double share_that_elects_the_wall(float exposure, bool shows) {
+/// near, by up to `spread` of that more or less. The source is `exposure` times as bright, which it
+/// `shows` pixels that passed the checks; an eighth of the grid around a pixel sees a lamp.
+double share_that_elects_the_wall(float exposure, bool shows, float spread = 0) {
   KernelFixture fixture(fisheye_rig(size), wide_range("fast"));
   const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
   fixture.show(render_plane(fixture.rig(), normal, 2), exposure);
@@ -109,11 +141,12 @@ double share_that_elects_the_wall(float exposure, bool shows) {
   const auto holds_wall = [](int x) { return x % 7 < 2; };
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
-      const Eigen::Vector3f m = holds_wall(x) ? wall : 2 * wall;
+      const float nearness = 2 * (1 + spread * (static_cast<float>((5 * x + 3 * y) % 11) / 5 - 1));
+      const Eigen::Vector3f m = holds_wall(x) ? wall : nearness * wall;
       fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x(), m.y(), m.z(), 0.2f);
-      const int seen = (x + y) % 5 == 0 ? size - 1 - x : x;
-      const float intensity = fixture.view(0).image().at<float>(y, seen);
-      const float shown = intensity < 0 ? MASKED_INTENSITY : exposure * intensity;
+      const float intensity = fixture.view(0).image().at<float>(y, x);
+      const bool lamp = (x / 10 + 3 * (y / 10)) % 8 == 0;
+      const float shown = intensity < 0 ? MASKED_INTENSITY : lamp ? 1 : exposure * intensity;
       const float reasons = shows ? 0 : REASON_INCONSISTENT;
       fixture.view(0).checks(y, x) = cv::Vec4f(1, 0, shown, reasons);
     }
@@ -133,6 +166,7 @@ double share_that_elects_the_wall(float exposure, bool shows) {
 
 TEST(VoteOnATexturedWall, TheSourceOutweighsTheMajority) {
   EXPECT_GT(share_that_elects_the_wall(1, false), 0.8);
+  EXPECT_GT(share_that_elects_the_wall(1, false, 0.05f), 0.8) << "which hardly differs: one rival";
 }
 
 TEST(VoteOnATexturedWall, TheMajorityDecidesWhereExposuresDifferAndNothingTellsIt) {
