@@ -12,7 +12,8 @@ constexpr int step = 3;
 
 class Measure : public ::testing::Test {
  protected:
-  Measure() : fixture_(fisheye_rig(size), wide_range("fast")) {
+  /// `roll`: of the source about its axis, radians.
+  explicit Measure(double roll = 0) : fixture_(rolled_rig(roll), wide_range("fast")) {
     const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
     const double offset = 2;
     wall_ = normal / offset;
@@ -21,6 +22,12 @@ class Measure : public ::testing::Test {
       fixture_.view(i).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
     }
     fixture_.set_reference(0);
+  }
+
+  static Rig rolled_rig(double roll) {
+    Rig rig = fisheye_rig(size);
+    rig.views[1].world_from_camera.rotate(Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()));
+    return rig;
   }
 
   /// Replaces the source's intensities b by gain b + offset.
@@ -36,6 +43,7 @@ class Measure : public ::testing::Test {
   /// `held` pixels off, over the middle of the image; `matched`: after a sub-pixel match, too.
   std::vector<double> measured(double held, bool matched) {
     std::vector<double> all;
+    deviations_.clear();
     for (int y = 24; y < size - 24; y += step) {
       for (int x = 24; x < size - 24; x += step) {
         const cv::Vec4f r = fixture_.view(0).rays(y, x);
@@ -48,13 +56,20 @@ class Measure : public ::testing::Test {
         };
         const double speed = measure(wall_)[1];
         if (speed <= 0) continue;
-        measure(wall_ + held / speed * ray);
+        deviations_.push_back(
+            std::sqrt(static_cast<double>(measure(wall_ + held / speed * ray)[0])));
         if (matched) kernel::cpu::subpixel_pixel(fixture_.context(), {x, y});
         const cv::Vec4f check = fixture_.view(0).checks(y, x);
         all.push_back((static_cast<double>(check[2]) - wall_.dot(ray)) * speed);
       }
     }
     return all;
+  }
+
+  /// Standard deviations that the measure tells of the same planes (px).
+  std::vector<double> deviations(double held) {
+    measured(held, false);
+    return deviations_;
   }
 
   /// Median of the variances of planes held on the wall (px^2), over the middle of the image,
@@ -81,10 +96,18 @@ class Measure : public ::testing::Test {
   }
 
   KernelFixture fixture_;
+  std::vector<double> deviations_;
   Eigen::Vector3d wall_;  ///< m of the plane that is seen
 };
 
-TEST_F(Measure, SubpixelMatchFindsWherePatchesMatch) {
+class MeasureOfRolledCameras : public Measure, public ::testing::WithParamInterface<double> {
+ protected:
+  MeasureOfRolledCameras() : Measure(GetParam()) {}
+};
+
+INSTANTIATE_TEST_SUITE_P(Radians, MeasureOfRolledCameras, ::testing::Values(0, 1, -2));
+
+TEST_P(MeasureOfRolledCameras, SubpixelMatchFindsWherePatchesMatch) {
   change_exposure(0.6, 0.1);
   for (const double held : {-0.3, 0.15, 0.3}) {
     const auto as_held = measured(held, false);
@@ -118,6 +141,20 @@ TEST_F(Measure, GradientsOfBrightnessAndNoiseDetermineNoDistance) {
     }
     fixture_.interpolate();
     EXPECT_GT(median_variance(), least) << "noise " << noise;
+  }
+}
+
+TEST_F(Measure, HalfOfTheDisplacementFromTheSourcesPlaneCountsUpToFivePixels) {
+  const kernel::vec3 m(static_cast<float>(wall_.x()), static_cast<float>(wall_.y()),
+                       static_cast<float>(wall_.z()));
+  const kernel::vec3 of_source =
+      kernel::cpu::plane_in_source(fixture_.schedule().parameters.pairs[1], m);
+  fixture_.view(1).hypotheses.setTo(cv::Scalar(of_source.x, of_source.y, of_source.z, 0.1));
+  for (const double held : {2.0, 4.0, 7.0}) {
+    double mean = 0;
+    const auto all = deviations(held);
+    for (const double deviation : all) mean += deviation / static_cast<double>(all.size());
+    EXPECT_NEAR(mean, 0.5 * std::min(held, 5.0), 0.15) << held;
   }
 }
 
