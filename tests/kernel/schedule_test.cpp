@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "error_of.h"
 #include "kernel_fixture.h"
 
@@ -77,9 +79,73 @@ TEST(Launches, RunOverAllViewsOfALevelWhereTheseDoNotReadEachOther) {
   EXPECT_THAT(single_launches(make_warm_schedule(rig, fast)), SizeIs(3 * 4));
   // All but the first iteration try the other views' planes; two colours.
   const Options quality = Options::preset_named("quality");
-  EXPECT_THAT(single_launches(make_schedule(rig, quality)),
-              AllOf(SizeIs(3 * (3 * 3 + 1 + 2 * (3 * 2 - 1))),
-                    Each(AnyOf(of_regression, Kernel::search))));
+  EXPECT_THAT(
+      single_launches(make_schedule(rig, quality)),
+      AllOf(SizeIs(3 * (3 * 3 + 1 + 2 * (3 * 2 - 1))), Each(AnyOf(of_regression, Kernel::search))));
+}
+
+/// Passes of a kernel, over the first view where each view has its own.
+std::vector<kernel::PassParameters> passes(const Schedule& schedule, Kernel kernel) {
+  std::vector<kernel::PassParameters> all;
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    if (dispatch.kernel == kernel && dispatch.pass.reference == dispatch.pass.first_view) {
+      all.push_back(dispatch.pass);
+    }
+  }
+  return all;
+}
+
+TEST(Passes, OfTheSearchTakeBothColoursAndHalveTheirSteps) {
+  Options options = Options::preset_named("fast");
+  options.level_iterations = {1, 2, 3};
+  const auto all = passes(make_schedule(rig_of(2), options), Kernel::search);
+  const std::vector<double> shares = {1, 1, 0.5, 1, 0.5, 0.25};  // levels from the coarsest on
+  ASSERT_EQ(all.size(), 2 * shares.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(all[i].colour, static_cast<int>(i % 2));
+    EXPECT_FLOAT_EQ(all[i].step_pixels, static_cast<float>(options.step_pixels * shares[i / 2]));
+    EXPECT_FLOAT_EQ(all[i].step_normal, static_cast<float>(options.step_normal * shares[i / 2]));
+  }
+}
+
+TEST(Passes, OfTheRegressionAskForMoreFromRoundToRound) {
+  const Options options = Options::preset_named("fast");
+  const auto all = passes(make_schedule(rig_of(2), options), Kernel::regress);
+  const std::vector<double> shares = {1, 1, 0.6, 1, 0.6, 0.36, 0};  // at last normals alone
+  ASSERT_EQ(all.size(), shares.size());
+  std::set<int> draws;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_FLOAT_EQ(all[i].deviation, static_cast<float>(options.regression_precision * shares[i]));
+    EXPECT_EQ(all[i].radius, (shares[i] > 0 ? 1 : 4) * options.regression_radius);
+    draws.insert(all[i].iteration);
+  }
+  EXPECT_EQ(draws.size(), all.size()) << "each has grids of its own";
+}
+
+TEST(Passes, OfRepairsSpareMatchesAndThoseOfTheFillingDoNot) {
+  Options options = Options::preset_named("fast");
+  options.fill_radius = 20;
+  const auto all = passes(make_schedule(rig_of(2), options), Kernel::adopt_fill);
+  ASSERT_EQ(all.size(), 4u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(all[i].radius, options.repair_radius);
+    EXPECT_EQ(all[i].candidates, REASON_NO_RAY | REASON_NO_OVERLAP | FILL_WITH_MATCHES);
+  }
+  EXPECT_EQ(all[3].radius, options.fill_radius);
+  EXPECT_EQ(all[3].candidates, static_cast<unsigned>(REASON_NO_RAY)) << "also what has no overlap";
+}
+
+TEST(Passes, InRasterOrderComeFromEitherSideByTurns) {
+  Options options = Options::preset_named("paper");
+  options.propagation = Propagation::raster;
+  options.first_iterations = 4;
+  options.second_iterations = 0;
+  const auto all = passes(make_schedule(rig_of(2), options), Kernel::iterate_raster);
+  ASSERT_EQ(all.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(all[i].neighbours,
+              i % 2 == 0 ? NEIGHBOUR_LEFT | NEIGHBOUR_UP : NEIGHBOUR_RIGHT | NEIGHBOUR_DOWN);
+  }
 }
 
 TEST(Checks, AmbiguityIsLookedForOnceAndOnlyWhereItIsAskedFor) {
