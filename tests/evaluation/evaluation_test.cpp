@@ -100,6 +100,9 @@ TEST_F(FourPixels, DisplacementsAreOfPointsInTheSourceImage) {
   const cv::Mat confidence = (cv::Mat_<float>(2, 4) << 0.9, 0.1, 0.8, 0.7, 0, 0, 0, 0);
   const auto curve = sparsification(distance, confidence, truth_, reference_, source_);
   EXPECT_NEAR(curve.back().bad_pixels, 1 / 3.0, 1e-12);
+  distance.at<float>(0, 3) = 0;  // none, outside of the source image
+  EXPECT_NEAR(evaluate(distance, {}, truth_, reference_, source_)[0].bad_pixels.at(1), 1 / 3.0,
+              1e-12);
   // A map that marks what lies outside says the same of what is visible.
   truth_.occlusion = (cv::Mat_<uchar>(2, 4) << 255, 255, 255, 128, 255, 255, 255, 255);
   scores = evaluate(distance, {}, truth_, reference_, source_);
@@ -108,6 +111,9 @@ TEST_F(FourPixels, DisplacementsAreOfPointsInTheSourceImage) {
   for (std::size_t region : {0, 1, 2}) {
     EXPECT_NEAR(scores[region].bad_pixels.at(1), 1 / 3.0, 1e-12);
   }
+  truth_.occlusion(cv::Rect(1, 0, 1, 1)).setTo(0);  // what has none
+  const auto of_visible = sparsification(distance, confidence, truth_, reference_, source_);
+  EXPECT_EQ(of_visible.back().bad_pixels, 0);
 }
 
 TEST_F(FourPixels, FarThingsWithoutGroundTruthAreRightWithinTwoPixels) {
@@ -373,7 +379,8 @@ TEST(Evaluation, ReliabilityCountsWhatIsRightInEachBin) {
   cv::Mat confidence(distance.size(), CV_32FC1, cv::Scalar(1));
   distance.rowRange(0, 48) *= 0.1;  // wrong
   confidence.rowRange(0, 48).setTo(0.1);
-  distance.row(0).setTo(0);  // not predicted: not counted
+  distance.row(40).setTo(0);  // not predicted: not counted
+  confidence.row(40).setTo(0.6);
   const std::vector<ReliabilityBin> bins =
       reliability(distance, confidence, truth, pair.rig.views[0], pair.rig.views[1]);
   EXPECT_NEAR(bins.front().mean_confidence, 0.1, 1e-6);

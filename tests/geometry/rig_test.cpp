@@ -85,6 +85,21 @@ TEST(ResizedViews, ExcludePixelsThatCoverExcludedOnes) {
   EXPECT_THROW(resized(view, 32, 24), Error);
 }
 
+TEST(Masks, ExcludeTheNearestPixelAndWhatIsOutside) {
+  View view;
+  EXPECT_FALSE(is_masked(view, {-5, 1})) << "no mask";
+  view.mask = cv::Mat(3, 4, CV_8UC1, cv::Scalar(255));
+  view.mask.at<uchar>(1, 2) = 0;
+  for (const Eigen::Vector2d& masked :
+       {Eigen::Vector2d(2, 1), {1.6, 0.6}, {2.4, 1.4}, {-0.6, 1}, {3.6, 1}, {1, -0.6}, {1, 2.6}}) {
+    EXPECT_TRUE(is_masked(view, masked)) << masked.transpose();
+  }
+  for (const Eigen::Vector2d& kept :
+       {Eigen::Vector2d(1.4, 1), {2.6, 1}, {2, 0.4}, {2, 1.6}, {-0.4, 1}, {3.4, 2.4}}) {
+    EXPECT_FALSE(is_masked(view, kept)) << kept.transpose();
+  }
+}
+
 TEST(RigGeometry, LocalOriginsAreWholeKilometresFarFromTheWorlds) {
   View view;
   const auto origin_at = [&view](double x, double y, double z) {
