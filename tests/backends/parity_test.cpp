@@ -547,6 +547,31 @@ TEST_P(EveryDevice, TreatsPixelsWithoutIntensityAsMasked) {
   expect_no_validation_messages(*device);
 }
 
+TEST_P(EveryDevice, SeesNothingOfWhatIsMasked) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  const RenderedPair pair = render_demo(64);
+  Rig rig = pair.rig;
+  const cv::Rect hole(24, 24, 12, 12);
+  for (View& view : rig.views) {
+    view.mask = cv::Mat(64, 64, CV_8UC1, cv::Scalar(255));
+    view.mask(hole).setTo(0);
+  }
+  Options options = Options::preset_named("fast");
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  Matcher matcher(*device, rig, options);
+  const StereoResult expected = matcher.match(images_of(pair));
+  std::vector<cv::Mat> other_images;
+  for (const cv::Mat& image : images_of(pair)) {
+    other_images.push_back(image.clone());
+    cv::RNG(1).fill(other_images.back()(hole), cv::RNG::UNIFORM, 0, 255);
+  }
+  const StereoResult result = matcher.match(other_images);
+  for (std::size_t view = 0; view < 2; ++view) {
+    expect_same_bits(expected.views[view], result.views[view]);
+  }
+  expect_no_validation_messages(*device);
+}
+
 /// A source a centimetre away, which tells next to nothing about distances, comes before the one
 /// that does.
 TEST_P(EveryDevice, BelievesTheSourceThatTellsMost) {
@@ -685,6 +710,14 @@ TEST(Checkerboard, ReachesRasterOrder) {
   };
   EXPECT_LT(bad(checkerboard), bad(raster) + 0.05);
   EXPECT_NEAR(cv::mean(checkerboard.views[0].cost)[0], cv::mean(raster.views[0].cost)[0], 0.03);
+}
+
+TEST(AcceptedDistance, IsThatOfPixelsThatAreNotRejectedOrFilledAllTheSame) {
+  ViewResult view;
+  view.distance = (cv::Mat_<float>(1, 3) << 1, 2, 3);
+  view.reasons = (cv::Mat_<std::uint16_t>(1, 3) << 0, reason_tilt, reason_tilt | reason_filled);
+  const cv::Mat expected = (cv::Mat_<float>(1, 3) << 1, 0, 3);
+  EXPECT_EQ(cv::norm(accepted_distance(view), expected), 0);
 }
 
 TEST(DeviceChoice, UnknownNamesAreErrors) {

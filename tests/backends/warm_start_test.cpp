@@ -203,7 +203,13 @@ TEST(Motion, IsFoundToAFractionOfAPixel) {
     const std::vector<cv::Mat> same = images_of(render_demo_from(now, size));
     std::vector<cv::Mat> brighter(same.size());
     for (std::size_t i = 0; i < same.size(); ++i) same[i].convertTo(brighter[i], -1, 0.8, 12);
-    for (const auto& images : {same, brighter}) {
+    std::vector<cv::Mat> passed_by;  // by something that moves by itself
+    for (const cv::Mat& image : same) {
+      const cv::Rect around(30, 30, 24, 24);
+      passed_by.push_back(image.clone());
+      cv::flip(image(around), passed_by.back()(around), 1);
+    }
+    for (const auto& images : {same, brighter, passed_by}) {
       SCOPED_TRACE(steps);
       const auto motion =
           estimate_motion(frame(0).rig, images_of(frame(0)), true_planes(frame(0)), images);
