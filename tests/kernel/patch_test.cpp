@@ -210,6 +210,17 @@ TEST(PatchCostRules, TexturelessPatchCarriesNoInformation) {
   const cv::Vec4f ray = fixture.view(0).rays(32, 32);
   const vec3 m(ray[0] / 2, ray[1] / 2, ray[2] / 2);
   EXPECT_EQ(kernel::cpu::patch_cost(fixture.context(), ivec2(32, 32), m), NO_INFORMATION_COST);
+  // One pixel of 49 differs.
+  fixture.view(0).image()(32, 33) = 0.6f;
+  const double deviation = 255 * 0.1 * std::sqrt(48.0) / 49;
+  const auto cost = [&](double min_texture) {
+    Options other = options;
+    other.min_texture = min_texture;
+    fixture.schedule() = make_schedule(fixture.rig(), other);
+    return kernel::cpu::patch_cost(fixture.context(), ivec2(32, 32), m);
+  };
+  EXPECT_EQ(cost(1.02 * deviation), NO_INFORMATION_COST);
+  EXPECT_NE(cost(0.98 * deviation), NO_INFORMATION_COST);
 }
 
 TEST(PatchCostRules, PlaneBetweenTheCamerasIsInvalid) {

@@ -91,6 +91,7 @@ TEST(Search, DrawsStayAdmissible) {
         const vec3 drawn = kernel::cpu::random_plane(fixture.context(), ivec2(x, y), ray, 0);
         ASSERT_TRUE(kernel::cpu::admissible(fixture.context(), ray, drawn));
         const double w = static_cast<double>(dot(drawn, ray));
+        ASSERT_GT(w / to_eigen(drawn).norm(), std::cos((options.max_tilt + 0.01) * CV_PI / 180));
         mean_distance += 1 / w;
         mean_inverse += w;
         ++n;
@@ -269,6 +270,25 @@ TEST(Transfer, OfSeveralPlanesTheNearestWins) {
       share_that_holds(fixture.view(1).hypotheses,
                        kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], near)),
       0.95);
+}
+
+TEST(Transfer, LeavesWhatIsSeenFromBehindOrOutOfRange) {
+  KernelFixture fixture(fisheye_rig(96), wide_range());
+  const auto share = [&](const vec3& m) {
+    fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+    transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+    return share_that_holds(
+        fixture.view(1).hypotheses,
+        kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m));
+  };
+  EXPECT_GT(share({0, 0, 0.5f}), 0.99);
+  fixture.schedule().parameters.range.w = 0.1f;  // 10 m at least
+  EXPECT_EQ(share({0, 0, 0.5f}), 0);
+  fixture.schedule().parameters.range.w = 100;
+  const Eigen::Vector3d centre = fixture.rig().views[1].world_from_camera.translation();
+  const vec3 between = to_kernel(centre.normalized() / (0.5 * centre.norm()));
+  fixture.schedule().parameters.patch_limits.z = 0;  // however oblique
+  EXPECT_EQ(share(between), 0);
 }
 
 TEST(Transfer, WithoutMotionEveryPixelKeepsItsPlane) {

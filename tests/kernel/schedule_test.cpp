@@ -108,6 +108,16 @@ TEST(Passes, OfTheSearchTakeBothColoursAndHalveTheirSteps) {
   }
 }
 
+TEST(Passes, OfAWarmSearchBringPlanesFromAllSides) {
+  const auto all =
+      passes(make_warm_schedule(rig_of(2), Options::preset_named("fast")), Kernel::search);
+  unsigned candidates = 0;
+  for (const kernel::PassParameters& pass : all) candidates |= pass.candidates;
+  for (const int strip : {STRIP_UP, STRIP_DOWN, STRIP_LEFT, STRIP_RIGHT}) {
+    EXPECT_NE(candidates & 1u << strip, 0u) << strip;
+  }
+}
+
 TEST(Passes, OfTheRegressionAskForMoreFromRoundToRound) {
   const Options options = Options::preset_named("fast");
   const auto all = passes(make_schedule(rig_of(2), options), Kernel::regress);
