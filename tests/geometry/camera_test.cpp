@@ -801,6 +801,24 @@ TEST(RandomCameras, RoundTripUpToTheEdgeOfTheDomain) {
   }
 }
 
+TEST(Pixels, ReachHalfAPixelToEitherSide) {
+  Camera camera;
+  camera.width = 4;
+  camera.height = 3;
+  camera.fx = camera.fy = 100;
+  const PreparedCamera prepared(camera);
+  Eigen::Vector2d pixel;
+  const auto is_inside = [&](double x, double y) {
+    return prepared.project_into_image({x / 100, y / 100, 1}, pixel);
+  };
+  for (const auto& [x, y] : {std::pair(-0.49, 1.0), {3.49, 1.0}, {1.0, -0.49}, {1.0, 2.49}}) {
+    EXPECT_TRUE(is_inside(x, y)) << x << ", " << y;
+  }
+  for (const auto& [x, y] : {std::pair(-0.51, 1.0), {3.51, 1.0}, {1.0, -0.51}, {1.0, 2.51}}) {
+    EXPECT_FALSE(is_inside(x, y)) << x << ", " << y;
+  }
+}
+
 TEST(BehindTheCamera, OnlyWideModelsSeeSidewaysAndBackwards) {
   for (const NamedCamera& named : cameras()) {
     const Camera& camera = named.camera;
