@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <stdexcept>
 #include <tuple>
 
 #include "device_fixture.h"
@@ -169,6 +170,15 @@ TEST_P(WarmStarts, ARefusedFrameChangesNothing) {
     EXPECT_TRUE(same_bits(result.views[i].hypotheses, expected.views[i].hypotheses)) << i;
   }
   expect_no_validation_messages(*device);
+}
+
+TEST(AbortedMatch, LeavesNoPlanesToStartFrom) {
+  Device device = Device::open("cpu");
+  Matcher matcher(device, frame(0).rig, options_of("fast"));
+  const auto abort = [](double) { throw std::runtime_error("aborted"); };
+  EXPECT_THROW(matcher.match(images_of(frame(0)), abort), std::runtime_error);
+  EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), {}); }),
+              HasSubstr("no planes of a previous frame"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, WarmStarts, ::testing::Values("cpu", "vulkan", "cuda"),
