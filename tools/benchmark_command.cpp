@@ -153,25 +153,29 @@ void add_benchmark_command(CLI::App& app) {
   CLI::App* command =
       app.add_subcommand("benchmark", "Time presets on devices, side by side in one run");
   auto a = std::make_shared<BenchmarkArguments>();
-  command->add_option("--devices", a->devices, "Devices, all usable ones by default")
+  command
+      ->add_option("--devices", a->devices,
+                   "Devices (several by comma), all usable ones by default")
       ->delimiter(',');
-  command->add_option("--presets", a->presets, "Presets")
+  command->add_option("--presets", a->presets, "Presets (several by comma)")
       ->delimiter(',')
       ->check(CLI::IsMember(ws::Options::preset_names()))
       ->capture_default_str();
-  command->add_option("--sizes", a->sizes, "Sides of the square images, pixels")
+  command->add_option("--sizes", a->sizes, "Sides of the square images, pixels (several by comma)")
       ->delimiter(',')
       ->check(CLI::Range(64, 4096))
       ->capture_default_str();
   command
       ->add_option("--window-radii", a->window_radii,
-                   "Patches of (2 r + 1)^2 pixels, the presets' own by default")
+                   "Patches of (2 r + 1)^2 pixels (several by comma), the presets' own by default")
       ->delimiter(',')
       ->check(CLI::Range(1, 15));
-  command->add_option("--warp", a->warp, "exact, affine or quadratic instead of the presets' own")
-      ->transform(warp_names());
-  command->add_option("--filter", a->filter, "exact or device instead of the presets' own")
-      ->transform(filter_names());
+  command->add_option("--warp", a->warp, "Instead of the presets' own")
+      ->transform(warp_names())
+      ->type_name("TEXT");
+  command->add_option("--filter", a->filter, "Instead of the presets' own")
+      ->transform(filter_names())
+      ->type_name("TEXT");
   command->add_option("--runs", a->runs, "Timed runs of each")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

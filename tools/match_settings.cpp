@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "match_settings.h"
 
-#include <map>
+#include <type_traits>
 
+#include "option_checks.h"
 #include "widestereo/error.h"
 
 using widestereo::DistanceSampling;
@@ -15,15 +16,13 @@ using widestereo::Propagation;
 using widestereo::SearchMethod;
 
 CLI::Validator warp_names() {
-  return CLI::CheckedTransformer(
-      std::map<std::string, PatchWarp>{{"exact", PatchWarp::exact},
-                                       {"affine", PatchWarp::affine},
-                                       {"quadratic", PatchWarp::quadratic}});
+  return name_among<PatchWarp>({{"exact", PatchWarp::exact},
+                                {"affine", PatchWarp::affine},
+                                {"quadratic", PatchWarp::quadratic}});
 }
 
 CLI::Validator filter_names() {
-  return CLI::CheckedTransformer(
-      std::map<std::string, Filter>{{"exact", Filter::exact}, {"device", Filter::device}});
+  return name_among<Filter>({{"exact", Filter::exact}, {"device", Filter::device}});
 }
 
 void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
@@ -51,9 +50,17 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
       ->check(CLI::IsMember(Options::preset_names()))
       ->capture_default_str()
       ->group(matching);
-  command.add_option("--min-distance", min_distance, "Nearest distance along the ray, metres")
+  const auto otherwise = [](double distance) {
+    return "; by default as the points of a COLMAP model or the demo's scene reach, else " +
+           CLI::detail::to_string(distance);
+  };
+  command
+      .add_option("--min-distance", min_distance,
+                  "Nearest distance along the ray, metres" + otherwise(Options().min_distance))
       ->group(matching);
-  command.add_option("--max-distance", max_distance, "Farthest distance along the ray, metres")
+  command
+      .add_option("--max-distance", max_distance,
+                  "Farthest distance along the ray, metres" + otherwise(Options().max_distance))
       ->group(matching);
   // Of parameters that one method of search alone has, or all.
   const auto adder = [&](const std::string& group, std::optional<SearchMethod> search = {}) {
@@ -62,7 +69,8 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
       const auto take = [=, this](const T& value) {
         given_.push_back({name, search, [=](Options& options) { options.*parameter = value; }});
       };
-      return command.add_option_function<T>(name, take, help)->group(group);
+      CLI::Option* option = command.add_option_function<T>(name, take, help)->group(group);
+      return std::is_enum_v<T> ? option->type_name("TEXT") : option;
     };
   };
   const auto add = adder(matching);
@@ -70,40 +78,37 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
   const auto add_pyramid = adder(matching, SearchMethod::pyramid);
   add("--seed", &Options::seed, "Seed of the random numbers");
   add("--window-radius", &Options::window_radius, "Patch of (2 r + 1)^2 pixels");
-  add("--warp", &Options::warp, "How a patch is mapped: exact, affine or quadratic")
-      ->transform(warp_names());
-  add_random("--sampling", &Options::sampling, "How distances are drawn: uniform or inverse")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, DistanceSampling>{
-          {"uniform", DistanceSampling::uniform}, {"inverse", DistanceSampling::inverse}}));
-  add("--propagation", &Options::propagation, "Order of pixels: checkerboard, or raster (CPU only)")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Propagation>{
-          {"checkerboard", Propagation::checkerboard}, {"raster", Propagation::raster}}));
+  add("--warp", &Options::warp, "How a patch is mapped")->transform(warp_names());
+  add_random("--sampling", &Options::sampling, "How distances are drawn")
+      ->transform(name_among<DistanceSampling>(
+          {{"uniform", DistanceSampling::uniform}, {"inverse", DistanceSampling::inverse}}));
+  add("--propagation", &Options::propagation, "Order of pixels; raster on the CPU only")
+      ->transform(name_among<Propagation>(
+          {{"checkerboard", Propagation::checkerboard}, {"raster", Propagation::raster}}));
   add_random("--iterations", &Options::first_iterations,
              "Preset paper: iterations of the first view");
   add_random("--second-iterations", &Options::second_iterations,
              "Preset paper: iterations of every further view");
   add_random("--refinements", &Options::refinements,
              "Preset paper: random perturbations per pixel and iteration");
-  add("--pattern", &Options::pattern, "Pixels of a patch that are compared: dense or checkerboard")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, PatchPattern>{
-          {"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
+  add("--pattern", &Options::pattern, "Pixels of a patch that are compared")
+      ->transform(name_among<PatchPattern>(
+          {{"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
   add("--weight-scale", &Options::weight_scale,
       "Intensity scale of patch weights, grey levels; 0 = none");
-  add("--interpolation", &Options::interpolation,
-      "Intensities halfway between a source's pixels: linear or cubic")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Interpolation>{
-          {"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}}));
-  add("--filter", &Options::filter,
-      "Bilinear samples of those: exact, or device (texture units of a GPU)")
+  add("--interpolation", &Options::interpolation, "Intensities halfway between a source's pixels")
+      ->transform(name_among<Interpolation>(
+          {{"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}}));
+  add("--filter", &Options::filter, "Bilinear samples of those; device: by a GPU's texture units")
       ->transform(filter_names());
   add_pyramid("--levels", &Options::levels, "Levels of the image pyramid");
   add_pyramid("--sweep-steps", &Options::sweep_steps,
               "Inverse distances tried at the coarsest level");
   add_pyramid("--level-iterations", &Options::level_iterations,
-              "Iterations of each level, coarsest first")
+              "Iterations of each level, coarsest first (by comma)")
       ->delimiter(',');
   add_pyramid("--level-regressions", &Options::level_regressions,
-              "Plane regressions of each level, coarsest first")
+              "Plane regressions of each level, coarsest first (by comma)")
       ->delimiter(',');
   add_pyramid("--regression-radius", &Options::regression_radius,
               "Radius of the plane regression, pixels");

@@ -3,10 +3,32 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 /// CLI11's own checks let NaN pass and name limits of 309 digits.
 CLI::Validator positive_number();
 CLI::Validator non_negative_number();
+
+/// One of these names, as text of the value's number, which is how CLI11 reads enumerations. Its
+/// own transformer takes the numbers, too, and lists both.
+template <class Value>
+CLI::Validator name_among(const std::vector<std::pair<std::string, Value>>& names) {
+  std::string list;
+  for (const auto& [name, value] : names) list += (list.empty() ? "{" : ",") + name;
+  list += "}";
+  return CLI::Validator(
+      [names, list](std::string& word) -> std::string {
+        for (const auto& [name, value] : names) {
+          if (word != name) continue;
+          word = std::to_string(static_cast<int>(value));
+          return "";
+        }
+        return word + " not in " + list;
+      },
+      list);
+}
 
 /// Makes every option, of subcommands too, refuse an empty word, and where it takes numbers NaN and
 /// infinity, and read whole numbers by their decimal digits.

@@ -292,9 +292,14 @@ void FolderFormat::add_for_fused_images_to(CLI::App& command) {
 
 void FolderFormat::add_extras_to(CLI::App& command, const std::string& clouds) {
   no_cloud = no_pictures = true;
-  command.add_flag("--clouds{false}", no_cloud, "Write point clouds (" + clouds + ")")
+  command
+      .add_flag_callback(
+          "--clouds", [this] { no_cloud = false; }, "Write point clouds (" + clouds + ")")
       ->group(group);
-  command.add_flag("--pictures{false}", no_pictures, "Write preview pictures")->group(group);
+  command
+      .add_flag_callback(
+          "--pictures", [this] { no_pictures = false; }, "Write preview pictures")
+      ->group(group);
 }
 
 void FolderFormat::require_room_for(double min_distance, double max_distance) const {

@@ -30,7 +30,9 @@ void RigSettings::add_fields_of_view_to(CLI::App& command) {
 
 void RigSettings::add_to(CLI::App& command, const std::string& or_other) {
   add_whole_rig_to(command, or_other);
-  command.add_option("--views", views, "Cameras of the calibration, one for each image")
+  command
+      .add_option("--views", views,
+                  "Cameras of the calibration, from 0, one for each image (by comma)")
       ->delimiter(',');
 }
 

@@ -11,10 +11,11 @@ namespace ws = widestereo;
 
 void SharpnessSettings::add_to(CLI::App& command) {
   command
-      .add_option("--blur", given_,
-                  "Blur images before they are matched: standard deviation, pixels, once for all "
-                  "views or once for each, 0 = do not; by default the sharper image of a pair, "
-                  "where the two differ")
+      .add_option(
+          "--blur", given_,
+          "Blur images before they are matched: standard deviation, pixels, one for all "
+          "views or one for each (by comma), 0 = do not; by default the sharper image of a pair, "
+          "where the two differ")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 10.0));
 }

@@ -253,6 +253,16 @@ TEST_F(RefusedWords, WholeNumbersAreDecimalDigits) {
   EXPECT_EQ(nlohmann::json::parse(outcome.output)["options"]["seed"], 10);
 }
 
+TEST_F(RefusedWords, NamesAreListed) {
+  const std::string depth = depth_of("left.png", "right.png");
+  expect_refusal(depth + " --warp bent", "--warp: bent not in {exact,affine,quadratic}");
+  expect_refusal(depth + " --warp 1", "--warp: 1 not in {exact,affine,quadratic}");
+  expect_refusal("benchmark --filter none", "--filter: none not in {exact,device}");
+  const std::string help = run("sequence --help").output;
+  EXPECT_NE(help.find("--warp TEXT:{exact,affine,quadratic}"), std::string::npos) << help;
+  EXPECT_NE(help.find("--clouds "), std::string::npos) << help;
+}
+
 TEST_F(RefusedWords, LimitsAreShort) {
   expect_refusal(sequence() + "--first -1", "--first: -1 is no number from 0 on");
   expect_refusal(sequence() + "--count -1", "--count: -1 is no number from 0 on");
