@@ -24,9 +24,12 @@ struct CheckArguments {
   bool as_json = false;
 };
 
+/// Then the epipolar error tells nothing: where the cameras look the same way, it is as small.
+bool lie_behind(const ws::EpipolarReport& report) { return report.behind > 0.5; }
+
 std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
   char text[160];
-  if (report.behind > 0.5) {
+  if (lie_behind(report)) {
     std::snprintf(text, sizeof text,
                   "%.0f %% of the features lie behind the cameras; are the images in the order of "
                   "the cameras?",
@@ -55,7 +58,8 @@ void check(const CheckArguments& arguments) {
   const auto sharpness = ws::compare_sharpness(first, second, left, right, matches);
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
-  const char* verdict = r.median_pixels < 0.5   ? "good"
+  const char* verdict = lie_behind(r) ? "wrong way round: swap the images, or invert the poses"
+                        : r.median_pixels < 0.5 ? "good"
                         : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"
                                                 : "too inaccurate for stereo: calibrate again";
   if (arguments.as_json) {

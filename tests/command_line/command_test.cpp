@@ -686,6 +686,9 @@ TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
                                 "order of the cameras?"),
             std::string::npos)
       << outcome.output;
+  // Their epipolar error is that of the right order.
+  EXPECT_NE(outcome.output.find("calibration: wrong way round"), std::string::npos)
+      << outcome.output;
   outcome = run(calibration("check", "left.png", "right.png"));
   EXPECT_NE(outcome.output.find("half below "), std::string::npos) << outcome.output;
   outcome = run(calibration("check", "left.png", "left.png"));
