@@ -88,6 +88,7 @@ void run_depth(const DepthArguments& arguments) {
   contents.origin = {{"images", files}, {"calibration", arguments.rig.calibration}};
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
   contents.origin["white_level"] = arguments.white_level.value();
+  if (!arguments.rig.masks.empty()) contents.origin["masks"] = arguments.rig.masks;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
 }

@@ -77,6 +77,16 @@ TEST_F(Command, DepthWritesEveryFormatAndJson) {
   EXPECT_TRUE(fs::exists(folder_ / "out/distance0.pfm"));
 }
 
+TEST_F(Command, DepthRecordsMasks) {
+  cv::imwrite(file("mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  const Outcome outcome =
+      run(depth_of("left.png", "right.png") + "--json --mask " + file("mask.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  EXPECT_EQ(record["input"].value("masks", nlohmann::json()),
+            nlohmann::json::array({file("mask.png")}));
+}
+
 TEST_F(Command, DepthScoresTexturedPixels) {
   for (const char* name : {"left.png", "right.png"}) {
     cv::Mat image = cv::imread(file(name));
