@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "commands.h"
@@ -40,6 +43,13 @@ struct DepthArguments {
 std::vector<std::string> files_of(const DepthArguments& arguments,
                                   const std::optional<ws::SfmModel>& model) {
   std::vector<std::string> files = arguments.images;
+  for (const std::string& file : files) {
+    std::error_code ignored;
+    if (!std::filesystem::is_directory(file, ignored)) continue;
+    throw ws::Error(file +
+                    " is a folder; give images, or have those of folders matched by `sequence` or "
+                    "`reconstruct`.");
+  }
   if (files.size() > 1) {
     if (!arguments.sources) return files;
     throw ws::Error("--sources chooses what joins one image, but " + std::to_string(files.size()) +
@@ -58,6 +68,17 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
   }
   for (const auto& source : sources) files.push_back(source.string());
   return files;
+}
+
+/// Pairs that fit their calibration have half or more (docs/accuracy.md).
+void report_little_accepted(const std::vector<ws::ViewResult>& views) {
+  constexpr double little = 0.4;
+  double accepted = 0;
+  for (const ws::ViewResult& view : views) accepted += accepted_share(view);
+  if (accepted >= little * static_cast<double>(views.size())) return;
+  std::puts(
+      "Little was accepted: check the order of the images, the calibration and the range of "
+      "distances (`widestereo calibration check`).");
 }
 
 void run_depth(const DepthArguments& arguments) {
@@ -91,6 +112,7 @@ void run_depth(const DepthArguments& arguments) {
   if (!arguments.rig.masks.empty()) contents.origin["masks"] = arguments.rig.masks;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
+  if (!arguments.as_json) report_little_accepted(run.result.views);
 }
 
 }  // namespace

@@ -184,6 +184,8 @@ TEST_F(Command, BadImagesAreNamed) {
   expect_error(depth_of("left.png", "cut.png"), "truncated");
   expect_error(depth_of("left.png", "small.png"), "96x48");
   expect_error(depth_of("calib.yaml", "right.png"), "calib.yaml");
+  expect_error("depth " + file("") + " -c " + file("calib.yaml") + " -o " + file("out"),
+               "is a folder; give images");
   expect_error(depth_of("left.png", "right.png") + "--mask " + file("small.png"), "mask");
   expect_error(depth_of("left.png", "right.png") + "--mask " + file("no.png"), "no.png");
 }
@@ -684,6 +686,17 @@ class ShiftedPair : public Command {
            " ";
   }
 };
+
+TEST_F(ShiftedPair, SwappedImagesAreMatchedWithAHint) {
+  const auto has_hint = [this](const std::string& images) {
+    const Outcome outcome = run("depth " + images + " -c " + file("calib.yaml") + " -o " +
+                                file("out") + " --preset fast --device cpu --min-distance 0.3");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return outcome.output.find("Little was accepted: check the order") != std::string::npos;
+  };
+  EXPECT_TRUE(has_hint(file("right.png") + " " + file("left.png")));
+  EXPECT_FALSE(has_hint(file("left.png") + " " + file("right.png")));
+}
 
 TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
   const std::string output = "-o " + file("refined.yaml");
