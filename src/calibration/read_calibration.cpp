@@ -113,7 +113,8 @@ Document load(const std::filesystem::path& path) {
   require_no_part_of_a_model(path);
   if (type != std::filesystem::file_type::regular) {
     throw Error(path.string() +
-                " is not a file; give a calibration file, or a folder with cam0/sensor.yaml.");
+                " is not a file; give a calibration file, a folder with cam0/sensor.yaml or, for "
+                "images that it has, a COLMAP model, the folder that holds cameras.bin or .txt.");
   }
   if (std::filesystem::file_size(path, error) > largest_file) {
     throw Error(path.string() + " is too large for a calibration file (16 MiB).");

@@ -65,7 +65,8 @@ Images images_in(const fs::path& folder) {
     }
   }
   if (error)
-    throw Error("Cannot read the folder " + folder.string() + ": " + error.message() + ".");
+    throw Error("Cannot read the folder " + folder.string() + ": " + error.message() +
+                "; check the path.");
   if (images.of_frames.empty()) {
     throw Error("There are no images in " + folder.string() + "; check the path.");
   }

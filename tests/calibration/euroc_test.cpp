@@ -126,6 +126,7 @@ TEST(EuRoC, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(error(folder / "late"), HasSubstr("number the cameras from cam0"));
   std::filesystem::create_directories(folder / "none/cam0");
   EXPECT_THAT(error(folder / "none"), HasSubstr("a folder with cam0/sensor.yaml"));
+  EXPECT_THAT(error(folder / "none"), HasSubstr("a COLMAP model, the folder that holds cameras"));
 }
 
 }  // namespace
