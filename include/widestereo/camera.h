@@ -18,10 +18,12 @@ namespace widestereo {
 enum class CameraModel : int {
   pinhole = 0,         ///< (x/z, y/z); domain z > 0
   pinhole_radtan = 1,  ///< pinhole, then Brown-Conrady distortion k1 k2 p1 p2 (k3)
-  kannala_brandt =
-      2,  ///< theta (1 + k1 theta^2 + ... + k4 theta^8): OpenCV fisheye, Kalibr equidistant
-  double_sphere = 3,     ///< xi, alpha (Usenko, Demmel, Cremers, 3DV 2018)
-  unified = 4,           ///< (x, y) / (z + xi d): Kalibr omni; xi = alpha / (1 - alpha)
+  /// theta (1 + k1 theta^2 + ... + k4 theta^8) (Kannala, Brandt, TPAMI 2006): OpenCV fisheye,
+  /// Kalibr equidistant
+  kannala_brandt = 2,
+  double_sphere = 3,  ///< xi, alpha (Usenko, Demmel, Cremers, 3DV 2018)
+  /// (x, y) / (z + xi d) (Mei, Rives, ICRA 2007): Kalibr omni; xi = alpha / (1 - alpha)
+  unified = 4,
   extended_unified = 5,  ///< alpha, beta (Khomutenko, Garcia, Martinet, RA-L 2016)
   field_of_view = 6,    ///< omega (Devernay, Faugeras, 2001), with atan2: reaches beyond 90 degrees
   mei = 7,              ///< unified, then Brown-Conrady: OpenCV omnidir, Kalibr omni + radtan
@@ -32,7 +34,8 @@ enum class CameraModel : int {
   thin_prism_fisheye = 10,
   /// theta (1 + k1 theta^2 + ... + k6 theta^12), then p1 p2 and s1..s4: Project Aria (Fisheye624)
   rad_tan_thin_prism_fisheye = 11,
-  /// theta (1 + k1 theta + k2 theta^2 + ... + k11 theta^11): OCam (Scaramuzza), WoodScape
+  /// theta (1 + k1 theta + k2 theta^2 + ... + k11 theta^11): WoodScape and, fitted, OCam
+  /// (Scaramuzza, Martinelli, Siegwart, IROS 2006)
   polynomial_fisheye = 12,
 };
 
