@@ -106,6 +106,14 @@ nlohmann::ordered_json describe_imu(const Eigen::Isometry3d& first_from_imu) {
            Eigen::AngleAxisd(first_from_imu.linear()).angle() * ws::degrees_per_radian}};
 }
 
+/// Most formats do not say where the lens ends.
+std::string limit_of_lens(double max_theta_degrees) {
+  if (max_theta_degrees >= 180) return "lens not limited";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f (lens)", max_theta_degrees);
+  return text;
+}
+
 void show(const ShowArguments& arguments) {
   const ws::Calibration calibration = ws::read_calibration(arguments.file);
   const std::vector<ws::View>& views = calibration.rig.views;
@@ -127,14 +135,15 @@ void show(const ShowArguments& arguments) {
     std::printf(
         "  %s  %s  %d x %d px  f %.2f %.2f  c %.2f %.2f px\n"
         "        field of view: horizontal %.1f, vertical %.1f, diagonal %.1f degrees; theta up to "
-        "%.1f (model), %.1f (lens)\n",
+        "%.1f (model), %s\n",
         v["name"].get<std::string>().c_str(), v["model"].get<std::string>().c_str(),
         v["width"].get<int>(), v["height"].get<int>(), v["fx"].get<double>(), v["fy"].get<double>(),
         v["cx"].get<double>(), v["cy"].get<double>(),
         v["horizontal_field_of_view_degrees"].get<double>(),
         v["vertical_field_of_view_degrees"].get<double>(),
         v["diagonal_field_of_view_degrees"].get<double>(),
-        v["model_max_theta_degrees"].get<double>(), v["max_theta_degrees"].get<double>());
+        v["model_max_theta_degrees"].get<double>(),
+        limit_of_lens(v["max_theta_degrees"].get<double>()).c_str());
   }
   for (const auto& p : json["pairs"]) {
     std::printf("  %s - %s  baseline %.5f m  rotation %.3f degrees  direction %.3f %.3f %.3f\n",

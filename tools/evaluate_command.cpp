@@ -124,9 +124,10 @@ void add_evaluate_command(CLI::App& app) {
       "--confidence", a->confidence,
       "Confidence map: prints the error of the most confident pixels, and how often pixels "
       "of each confidence are right");
-  command->add_option("--set", a->set,
-                      "Folder with depthN.tiff, validN.png, occN.png, normalN.tiff, camN.png, "
-                      "fovN.png, calib.yaml");
+  command->add_option(
+      "--set", a->set,
+      "Folder with depthN.tiff, validN.png, occN.png or occN_M.png, normalN.tiff, camN.png, "
+      "fovN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");
   command->add_option("--occlusion", a->occlusion,

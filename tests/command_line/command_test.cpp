@@ -523,7 +523,11 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   const nlohmann::json shown = nlohmann::json::parse(outcome.output);
   EXPECT_EQ(shown["views"][0]["model"], "double_sphere");
   EXPECT_NEAR(shown["pairs"][0]["baseline_metres"].get<double>(), 0.1, 1e-12);
-  EXPECT_EQ(run("calibration show " + file("calib.yaml")).exit_code, 0);
+  outcome = run("calibration show " + file("calib.yaml"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find(" (model), 97.5 (lens)\n"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find(" (model), lens not limited\n"), std::string::npos)
+      << outcome.output;
   EXPECT_FALSE(shown.contains("imu"));
   write_calibration_with_imu();
   outcome = run("calibration show " + file("imucam.yaml") + " --json");
