@@ -89,6 +89,11 @@ Selection select_frames(const SequenceArguments& a) {
     cameras.resize(a.frames.folders.empty() ? 2 : a.frames.folders.size());
     std::iota(cameras.begin(), cameras.end(), 0);
   }
+  if (cameras.size() == 1) {
+    throw ws::Error(
+        "A sequence is of two cameras or more; give one that moves to `reconstruct`, with "
+        "--poses.");
+  }
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
@@ -375,6 +380,9 @@ void add_sequence_command(CLI::App& app) {
   auto a = std::make_shared<SequenceArguments>();
   command->add_option("dataset", a->dataset, FrameSettings::layouts)->required();
   a->rig.add_to(*command);
+  command->get_option("--views")->description(
+      "Cameras of the calibration, from 0 (by comma); by default the first two, or as many as "
+      "--folders names");
   a->size.add_to(*command);
   a->white_level.add_to(*command);
   a->sharpness.add_to(*command);

@@ -500,6 +500,8 @@ TEST_F(SequenceCommand, BadInputIsNamedAndLeavesNothing) {
   expect(sequence() + "--views 0,2", "cam2");
   expect(sequence() + "--folders cam0,none", "none");
   expect(sequence() + "--views 0,1 --folders cam0", "--folders names 1 folders for 2 cameras");
+  expect(sequence() + "--folders cam0", "give one that moves to `reconstruct`, with --poses");
+  expect(sequence() + "--views 1", "give one that moves to `reconstruct`, with --poses");
   expect(sequence() + "--poses " + file("none.txt"), "none.txt");
   folder_.write("few.txt", "1 0 0 0 0 0 0 1\n");
   expect(sequence() + "--poses " + file("few.txt"), "1 poses for 3 frames");
