@@ -161,7 +161,9 @@ Rig read_basalt(const Document& document) {
   try {
     const Json root = Json::parse(document.text);
     if (!root.contains("value0")) {
-      document.fail("It has no \"value0\" as a Basalt calibration has; is it another JSON file?");
+      document.fail(
+          "It has no \"value0\" as a Basalt calibration has; give one, or one of the other "
+          "formats.");
     }
     const Json& value = root.at("value0");
     const Json& cameras = list(document, value, "intrinsics");
