@@ -13,6 +13,13 @@
 
 namespace widestereo::test {
 
+inline Eigen::Vector3d to_eigen(const kernel::vec3& v) {
+  return Eigen::Vector3f(v.x, v.y, v.z).cast<double>();
+}
+inline kernel::vec3 to_kernel(const Eigen::Vector3d& v) {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
 /// TUM-VI-like double-sphere camera of `size` x `size` pixels that sees `max_theta` radians off
 /// axis.
 inline Camera fisheye_camera(int size, double max_theta = 1.7) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the adaptive search tries, one kind of candidate at a time.
+// What the adaptive search tries, one kind of candidate at a time, and what it prefers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,8 +16,6 @@ using kernel::vec3;
 
 constexpr int size = 96;
 constexpr int middle = size / 2;
-
-Eigen::Vector3d to_eigen(const vec3& v) { return Eigen::Vector3f(v.x, v.y, v.z).cast<double>(); }
 
 class Candidates : public ::testing::Test {
  protected:
@@ -158,6 +156,43 @@ TEST_F(Candidates, AreDrawnFromAroundWhatIsHeldToEitherSide) {
     EXPECT_GT(axis.high, 0.9 * turn);
     EXPECT_LT(axis.high, 1.6 * turn);
   }
+}
+
+TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
+  Options options = wide_range();
+  options.far_preference = 0.08;
+  KernelFixture fixture(fisheye_rig(96), options);
+  const ivec2 pixel(48, 48);
+  const cv::Vec4f r = fixture.view(0).rays(48, 48);
+  const vec3 ray(r[0], r[1], r[2]);
+  // `small`: difference of inverse distance up to which planes are as far as each other.
+  const auto chosen_distance = [&](double held_distance, double held_cost, double distance,
+                                   float small = 0) {
+    const float w = static_cast<float>(1 / held_distance);
+    const kernel::vec4 held(w * ray, static_cast<float>(held_cost));
+    const kernel::vec4 better = kernel::cpu::better_of(
+        fixture.context(), pixel, ray, held, static_cast<float>(1 / distance) * ray, small);
+    return static_cast<double>(1 / (better.x * ray.x + better.y * ray.y + better.z * ray.z));
+  };
+  for (int view = 0; view < 2; ++view) fixture.view(view).image().setTo(0.5);
+  fixture.interpolate();
+  EXPECT_NEAR(chosen_distance(2, NO_INFORMATION_COST, 90), 90, 0.01) << "nothing to see: far";
+  EXPECT_NEAR(chosen_distance(90, NO_INFORMATION_COST, 2), 90, 0.01);
+  EXPECT_NEAR(chosen_distance(2, 0.9, 90), 2, 1e-4) << "a difference in cost outweighs it";
+  EXPECT_NEAR(chosen_distance(30, NO_INFORMATION_COST, 40), 40, 0.01);
+  EXPECT_NEAR(chosen_distance(30, NO_INFORMATION_COST, 40, 0.01f), 30, 0.01) << "as good as there";
+
+  // On a gradient of brightness every plane matches well.
+  for (int view = 0; view < 2; ++view) {
+    cv::Mat image = fixture.view(view).image();
+    gradient(image.size(), 0.005, 0, 0, 1).copyTo(image);
+    image += 0.02 * smooth_noise(image.size(), view + 1);
+  }
+  fixture.interpolate();
+  const double of_far = kernel::cpu::patch_cost(fixture.context(), pixel, (1.0f / 90) * ray);
+  ASSERT_LT(of_far, 0.1);
+  EXPECT_NEAR(chosen_distance(2, of_far / 1.03, 90), 90, 0.01) << "nearly as good";
+  EXPECT_NEAR(chosen_distance(2, of_far / 1.12, 90), 2, 1e-4) << "a tenth worse";
 }
 
 }  // namespace

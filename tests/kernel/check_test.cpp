@@ -1,0 +1,464 @@
+// SPDX-License-Identifier: MIT
+// Checks, ambiguity and the filling of what they reject.
+#include <gtest/gtest.h>
+
+#include "kernel_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using kernel::ivec2;
+using kernel::vec3;
+
+TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
+  Options options;
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  KernelFixture fixture(fisheye_rig(96), options);
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  const Eigen::Vector3d moved =
+      to_eigen(kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], to_kernel(m)));
+  const auto fill = [&](int view, const Eigen::Vector3d& plane) {
+    const vec3 mk = to_kernel(plane);
+    fixture.view(view).hypotheses.setTo(cv::Scalar(mk.x, mk.y, mk.z, 0.1));
+  };
+  fill(0, m);
+  fill(1, moved);
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  cv::Vec4f check = fixture.view(0).checks(48, 48);
+  EXPECT_LT(check[0], 1e-4);
+  EXPECT_LT(check[1], 1e-2);
+  const float consistent = check[2];
+  EXPECT_GT(consistent, 0.9f);
+  EXPECT_EQ(check[3], 0);
+
+  fill(1, 1.05 * moved);  // 5 % nearer
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  check = fixture.view(0).checks(48, 48);
+  EXPECT_NEAR(check[0], 0.05, 0.003);
+  EXPECT_EQ(static_cast<int>(check[3]), REASON_INCONSISTENT);
+  fill(1, 3 * moved);
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  check = fixture.view(0).checks(48, 48);
+  EXPECT_GT(check[1], 2);
+  const auto odds = [](float confidence) { return confidence / (1 - confidence); };
+  EXPECT_LT(odds(check[2]), 0.5f * odds(consistent)) << "pixels off";
+
+  fixture.view(0).hypotheses.setTo(cv::Scalar(0, 0, 0, 2));
+  kernel::cpu::check_pixel(fixture.context(), ivec2(48, 48));
+  EXPECT_EQ(static_cast<int>(fixture.view(0).checks(48, 48)[3]), REASON_NO_OVERLAP);
+  kernel::cpu::check_pixel(fixture.context(), ivec2(0, 0));
+  EXPECT_EQ(static_cast<int>(fixture.view(0).checks(0, 0)[3]), REASON_NO_RAY);
+}
+
+/// Views, two unless a rig is given, that agree on one plane everywhere.
+class AgreeingViews {
+ public:
+  explicit AgreeingViews(const Options& options,
+                         const Eigen::Vector3d& plane_of_first = {0.05, 0.1, 0.5},
+                         const Rig& rig = fisheye_rig(96))
+      : fixture(rig, options), first_(to_kernel(plane_of_first)) {
+    for (int view = 0; view < static_cast<int>(rig.views.size()); ++view) {
+      const vec3 m = plane(view);
+      fixture.view(view).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+    }
+  }
+
+  /// The plane m . X = 1 of view 0 in the frame of `view`.
+  vec3 plane(int view) {
+    if (view == 0) return first_;
+    return kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[view], first_);
+  }
+
+  int reasons(ivec2 pixel) {
+    kernel::cpu::check_pixel(fixture.context(), pixel);
+    return static_cast<int>(fixture.view(0).checks(pixel.y, pixel.x)[3]);
+  }
+
+  /// Scales the planes of both views in a square around the pixel, so that they still agree.
+  void scale_square(ivec2 pixel, int radius, float factor) {
+    for (int view = 0; view < 2; ++view) {
+      cv::Mat square = fixture.view(view).hypotheses(
+          cv::Rect(pixel.x - radius, pixel.y - radius, 2 * radius + 1, 2 * radius + 1));
+      const vec3 m = factor * plane(view);
+      square.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+    }
+  }
+
+  KernelFixture fixture;
+
+ private:
+  vec3 first_;
+};
+
+/// Pixels that the source sees the point at `ray` / w move per unit of w.
+double pixels_per_inverse_distance(const View& source, const View& reference,
+                                   const Eigen::Vector3d& ray, double w) {
+  const Eigen::Isometry3d motion = source_from_reference(source, reference);
+  constexpr double step = 1e-4;
+  Eigen::Vector2d nearer;
+  Eigen::Vector2d farther;
+  EXPECT_TRUE(project(source.camera, motion * (ray / (w + step)), nearer));
+  EXPECT_TRUE(project(source.camera, motion * (ray / (w - step)), farther));
+  return (nearer - farther).norm() / (2 * step);
+}
+
+TEST(Checks, RejectFromEachOptionsLimitOn) {
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  const cv::Point pixel(28, 66);  // off both axes
+  const Options generous = [] {
+    Options options = wide_range();
+    options.min_texture = options.min_parallax = options.min_support = 0;
+    options.max_cost = 2;
+    options.max_tilt = 90;
+    options.consistency_relative = options.consistency_pixels = 1000;
+    return options;
+  }();
+  const Rig rig = fisheye_rig(96);
+  constexpr double nearer = 1.05;  // what the source holds
+  const auto reasons = [&](double Options::*limit, double value, bool source_has_planes = true) {
+    Options options = generous;
+    options.*limit = value;
+    AgreeingViews views(options, m);
+    const vec3 held = static_cast<float>(nearer) * views.plane(1);
+    views.fixture.view(1).hypotheses.setTo(
+        cv::Scalar(held.x, held.y, held.z, source_has_planes ? 0.1f : INVALID_COST));
+    return views.reasons({pixel.x, pixel.y});
+  };
+  Eigen::Vector3d ray;
+  ASSERT_TRUE(unproject(rig.views[0].camera, {pixel.x, pixel.y}, ray));
+  const double w = m.dot(ray);
+
+  AgreeingViews views(generous, m);
+  constexpr int radius = 5;  // of the patch
+  cv::Scalar mean;
+  cv::Scalar texture;
+  cv::meanStdDev(views.fixture.view(0).image()(
+                     cv::Rect(pixel.x - radius, pixel.y - radius, 2 * radius + 1, 2 * radius + 1)),
+                 mean, texture);
+  const double parallax = pixels_per_inverse_distance(rig.views[1], rig.views[0], ray, w) *
+                          (1 / generous.min_distance - 1 / generous.max_distance);
+  const double tilt = std::acos(w / m.norm()) * 180 / CV_PI;
+  // Where the source's plane puts the point that both see in the same direction of the source.
+  const Eigen::Isometry3d motion = source_from_reference(rig.views[1], rig.views[0]);
+  const Eigen::Vector3d of_source = motion * (ray / w) / nearer;
+  Eigen::Vector2d back;
+  ASSERT_TRUE(project(rig.views[0].camera, motion.inverse() * of_source, back));
+  const double displacement = (back - Eigen::Vector2d(pixel.x, pixel.y)).norm();
+
+  struct Limit {
+    double Options::*option;
+    double truth;
+    bool is_least;
+    int reason;
+    double tolerance;
+  };
+  for (const auto& [option, truth, is_least, reason, tolerance] :
+       {Limit{&Options::min_texture, 255 * texture[0], true, REASON_NO_TEXTURE, 0.01},
+        {&Options::max_cost, 0.1, false, REASON_HIGH_COST, 0.01},
+        {&Options::min_parallax, parallax, true, REASON_LOW_PARALLAX, 0.1},
+        {&Options::max_tilt, tilt, false, REASON_TILT, 0.01},
+        {&Options::consistency_relative, 1 - 1 / nearer, false, REASON_INCONSISTENT, 0.01},
+        {&Options::consistency_pixels, displacement, false, REASON_INCONSISTENT, 0.01}}) {
+    EXPECT_EQ(reasons(option, truth * (1 - tolerance)), is_least ? 0 : reason) << reason;
+    EXPECT_EQ(reasons(option, truth * (1 + tolerance)), is_least ? reason : 0) << reason;
+  }
+  EXPECT_EQ(reasons(&Options::consistency_pixels, 0, false), REASON_UNCHECKED);
+}
+
+TEST(Checks, TheBestOfSeveralSourcesCounts) {
+  Rig rig = fisheye_rig(96);
+  rig.views.push_back(rig.views[1]);
+  rig.views[2].name = "cam2";
+  rig.views[1].world_from_camera.translation() *= 0.1;
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  Eigen::Vector3d ray;
+  ASSERT_TRUE(unproject(rig.views[0].camera, {48, 48}, ray));
+  Options options = wide_range();
+  options.min_parallax = 0.5 *
+                         pixels_per_inverse_distance(rig.views[2], rig.views[0], ray, m.dot(ray)) *
+                         (1 / options.min_distance - 1 / options.max_distance);
+  for (const char* far : {"last", "first"}) {
+    SCOPED_TRACE(far);
+    AgreeingViews views(options, m, rig);
+    EXPECT_EQ(views.reasons({48, 48}), 0) << "parallax";
+    for (const int wrong : {1, 2}) {
+      cv::Mat planes = views.fixture.view(wrong).hypotheses;
+      const cv::Mat right = planes.clone();
+      planes *= 1.2;
+      EXPECT_EQ(views.reasons({48, 48}), 0) << "cam" << wrong << " disagrees";
+      right.copyTo(planes);
+    }
+    for (const int view : {1, 2}) views.fixture.view(view).hypotheses *= 1.2;
+    EXPECT_EQ(views.reasons({48, 48}), REASON_INCONSISTENT);
+    std::swap(rig.views[1], rig.views[2]);
+  }
+}
+
+TEST(Checks, ForAVoteTellWhatTheSourceShowsOfThePoint) {
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.1, 0.2, 1).normalized();
+  AgreeingViews views(wide_range(), normal / 2);
+  KernelFixture& fixture = views.fixture;
+  fixture.show(render_plane(fixture.rig(), normal, 2), 0.5);
+  fixture.set_reference(0);
+  for (int x = 30; x < 66; x += 5) {
+    fixture.pass().candidates = 0;
+    ASSERT_EQ(views.reasons({x, 48}), 0);
+    const float displacement = fixture.view(0).checks(48, x)[1];
+    fixture.pass().candidates = CHECK_FOR_VOTE;
+    EXPECT_EQ(views.reasons({x, 48}), 0);
+    const cv::Vec4f check = fixture.view(0).checks(48, x);
+    EXPECT_EQ(check[0], 1) << "the source";
+    EXPECT_EQ(check[1], displacement);
+    EXPECT_NEAR(check[2], 0.5f * fixture.view(0).image().at<float>(48, x), 0.02);
+  }
+}
+
+TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {
+  AgreeingViews views(wide_range());
+  EXPECT_EQ(views.reasons({48, 48}) & REASON_SPECKLE, 0);
+  const float alone = [&] {
+    views.scale_square({48, 48}, 2, 3);
+    EXPECT_NE(views.reasons({48, 48}) & REASON_SPECKLE, 0);
+    return views.fixture.view(0).checks(48, 48)[2];
+  }();
+  views.scale_square({48, 48}, 14, 3);
+  EXPECT_EQ(views.reasons({48, 48}) & REASON_SPECKLE, 0);
+  EXPECT_LT(alone, views.fixture.view(0).checks(48, 48)[2]) << "confidence falls with support";
+}
+
+TEST(Checks, AgreementWithoutEvidenceIsNotConfident) {
+  AgreeingViews views(wide_range());
+  KernelFixture& fixture = views.fixture;
+  const auto confidence_at_cost = [&](double cost_around) {
+    const vec3 m = views.plane(0);
+    fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, cost_around));
+    fixture.view(0).hypotheses(48, 48)[3] = 0.5f;
+    views.reasons({48, 48});
+    return fixture.view(0).checks(48, 48)[2];
+  };
+  EXPECT_EQ(confidence_at_cost(0.5), confidence_at_cost(0.1)) << "enough to go by";
+  EXPECT_GT(confidence_at_cost(0.5), 0.9);
+  EXPECT_LT(confidence_at_cost(0.9), 0.2);
+  EXPECT_EQ(confidence_at_cost(1.0), 0);
+  EXPECT_EQ(confidence_at_cost(1.3), 0) << "nor do contrary patches speak for a plane";
+}
+
+TEST(Checks, AgreementOnGradientsOfBrightnessIsNotCertain) {
+  AgreeingViews views(wide_range());
+  cv::Mat image = views.fixture.view(0).image();
+  const auto mean_confidence = [&views] {
+    constexpr int step = 4;
+    double sum = 0;
+    int count = 0;
+    for (int y = 32; y < 64; y += step) {
+      for (int x = 32; x < 64; x += step, ++count) {
+        views.reasons({x, y});
+        sum += static_cast<double>(views.fixture.view(0).checks(y, x)[2]);
+      }
+    }
+    return sum / count;
+  };
+  const double textured = mean_confidence();
+  for (const double noise : {0.0, 0.004}) {
+    gradient(image.size(), 0.003, 0, noise, 1).copyTo(image);
+    EXPECT_LT(mean_confidence(), 0.8) << "noise " << noise;
+    image += 0.06 * smooth_noise(image.size(), 1);
+    EXPECT_GT(mean_confidence(), textured) << "weak texture is as good, noise " << noise;
+  }
+  cv::RNG(1).fill(image, cv::RNG::NORMAL, 0.5, 0.06);
+  EXPECT_GT(mean_confidence(), 0.95 * textured) << "texture as fine as noise";
+  for (const int slope : {-1, 1}) {
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        image.at<float>(y, x) = static_cast<float>(0.5 + 0.1 * std::sin(0.4 * (x + slope * y)));
+      }
+    }
+    EXPECT_GT(mean_confidence(), 0.95 * textured) << "stripes along either diagonal";
+  }
+}
+
+TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
+  Options options = wide_range();
+  options.ambiguity_margin = 0.2;
+  AgreeingViews views(options);
+  const auto added_at_cost = [&](double cost, int places) {
+    const vec3 m = views.plane(0);
+    views.fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, cost));
+    views.fixture.pass().places = places;
+    const int before = views.reasons({48, 48});
+    kernel::cpu::ambiguity_pixel(views.fixture.context(), {48, 48});
+    return static_cast<int>(views.fixture.view(0).checks(48, 48)[3]) - before;
+  };
+  // Unrelated images: some other place always matches much better than the worst cost.
+  EXPECT_EQ(added_at_cost(1.9, 6), REASON_AMBIGUOUS);
+  EXPECT_EQ(added_at_cost(0.1, 6), 0);
+  EXPECT_EQ(added_at_cost(1.9, 0), 0) << "nowhere else";
+  EXPECT_EQ(added_at_cost(2, 6), 0) << "no plane";
+}
+
+TEST(Checks, ABetterMatchElsewhereLiesToEitherSideAndMatchesBetterByTheMargin) {
+  Options options = wide_range("fast");
+  options.ambiguity_margin = 0.2;
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+  const Eigen::Vector3d wall = normal / 2;
+  KernelFixture fixture(fisheye_rig(128), options);
+  fixture.show(render_plane(fixture.rig(), normal, 2));
+  fixture.set_reference(0);
+  // Share of the pixels that find the wall, held that many source pixels too near.
+  const auto share = [&](double pixels, float cost) {
+    constexpr int places = 6;
+    fixture.pass().places = places;
+    int ambiguous = 0;
+    int count = 0;
+    for (int y = 34; y < 94; y += 5) {
+      for (int x = 34; x < 94; x += 5, ++count) {
+        Eigen::Vector3d ray;
+        EXPECT_TRUE(unproject(fixture.rig().views[0].camera, {x, y}, ray));
+        const double w = wall.dot(ray);
+        const double speed =
+            pixels_per_inverse_distance(fixture.rig().views[1], fixture.rig().views[0], ray, w);
+        const vec3 m = to_kernel((1 + pixels / speed / w) * wall);
+        fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, cost);
+        fixture.view(0).checks(y, x) = cv::Vec4f(0, 0, 1, 0);
+        kernel::cpu::ambiguity_pixel(fixture.context(), {x, y});
+        ambiguous += fixture.view(0).checks(y, x)[3] == REASON_AMBIGUOUS;
+      }
+    }
+    return static_cast<double>(ambiguous) / count;
+  };
+  for (const double pixels : {-4.0, -2.0, 2.0, 4.0}) {
+    EXPECT_GT(share(pixels, 0.5f), 0.9) << pixels << " px";
+    EXPECT_EQ(share(pixels, 0.15f), 0) << pixels << " px, less than the margin better";
+  }
+}
+
+TEST(Fill, RejectedPixelsTakeTheFartherSurfaceAndAreMarked) {
+  Options options = wide_range();
+  options.fill_radius = 10;
+  AgreeingViews views(options);
+  KernelFixture& fixture = views.fixture;
+  fixture.view(0).priors = cv::Mat::zeros(96, 96, CV_32FC4);
+  fixture.view(0).image().setTo(0.5);
+  const vec3 m = views.plane(0);
+  // A nearer object on the left, the surface behind it on the right, and rejected pixels between.
+  fixture.view(0).hypotheses.colRange(0, 44).setTo(cv::Scalar(3 * m.x, 3 * m.y, 3 * m.z, 0.1));
+  cv::Mat between = fixture.view(0).hypotheses.colRange(44, 50);
+  between.setTo(cv::Scalar(2 * m.x, 2 * m.y, 2 * m.z, 0.3));
+  fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0.9, 0));
+  fixture.view(0).checks.colRange(44, 50).setTo(cv::Scalar(0.5, 9, 0.1, REASON_INCONSISTENT));
+  fixture.pass().radius = options.fill_radius;
+  fixture.pass().candidates = REASON_NO_RAY;
+  const auto fill = [&](ivec2 pixel) {
+    kernel::cpu::fill_pixel(fixture.context(), pixel);
+    kernel::cpu::adopt_fill_pixel(fixture.context(), pixel);
+    return fixture.view(0).checks(pixel.y, pixel.x);
+  };
+
+  const cv::Vec4f check = fill({46, 48});
+  const cv::Vec4f filled = fixture.view(0).hypotheses(48, 46);
+  EXPECT_EQ(static_cast<int>(check[3]), REASON_INCONSISTENT | REASON_FILLED);
+  EXPECT_EQ(check[2], 0) << "nothing is known about it";
+  EXPECT_FLOAT_EQ(filled[2], m.z);
+  EXPECT_LE(filled[3], NO_INFORMATION_COST);
+
+  EXPECT_EQ(fill({60, 48})[3], 0) << "accepted pixels stay";
+  fixture.view(0).checks(48, 45)[3] = REASON_NO_RAY;
+  EXPECT_EQ(static_cast<int>(fill({45, 48})[3]), REASON_NO_RAY) << "left out as asked for";
+  fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0, REASON_HIGH_COST));
+  fixture.view(0).checks.colRange(70, 96).setTo(cv::Scalar(0, 0, 0.9, 0));
+  EXPECT_EQ(static_cast<int>(fill({47, 48})[3]), REASON_HIGH_COST) << "too far away";
+}
+
+/// A rejected pixel in the middle of others, and what of its surroundings is accepted.
+class FillOfAPixel : public ::testing::Test {
+ protected:
+  FillOfAPixel() : views_(wide_range()), m_(views_.plane(0)) {
+    KernelFixture& fixture = views_.fixture;
+    fixture.view(0).image().setTo(0.5);
+    fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0, REASON_HIGH_COST));
+    fixture.pass().radius = 10;
+    fixture.pass().candidates = REASON_NO_RAY;
+  }
+
+  /// A pixel, from the rejected one, that holds a multiple of the plane and is accepted.
+  void accept(int dx, int dy, float factor, float intensity = 0.5f) {
+    ViewMemory& view = views_.fixture.view(0);
+    view.hypotheses(y + dy, x + dx) = cv::Vec4f(factor * m_.x, factor * m_.y, factor * m_.z, 0.1f);
+    view.checks(y + dy, x + dx) = cv::Vec4f(0, 0, 0.9f, 0);
+    view.image()(y + dy, x + dx) = intensity;
+  }
+
+  /// The multiple that the pixel would take over; 0 where there is none.
+  float filled() {
+    kernel::cpu::fill_pixel(views_.fixture.context(), {x, y});
+    return views_.fixture.view(0).priors(y, x)[2] / m_.z;
+  }
+
+  using ViewMemory = kernel::cpu::ViewMemory;
+  static constexpr int x = 48;
+  static constexpr int y = 48;
+  AgreeingViews views_;
+  vec3 m_;
+};
+
+TEST_F(FillOfAPixel, LooksEquallyFarInEightDirections) {
+  for (int i = 0; i < 9; ++i) {
+    const int dx = i % 3 - 1;
+    const int dy = i / 3 - 1;
+    if (dx == 0 && dy == 0) continue;
+    const int reach = dx != 0 && dy != 0 ? 7 : 10;  // the same circle
+    for (const int far : {reach, reach + 1}) {
+      views_.fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0, REASON_HIGH_COST));
+      accept(far * dx, far * dy, 2);
+      EXPECT_EQ(filled(), far == reach ? 2 : 0) << dx << ", " << dy;
+    }
+  }
+}
+
+TEST_F(FillOfAPixel, TakesTheMedianOfASurface) {
+  accept(-3, 0, 1);
+  accept(5, 0, 1.01f);
+  accept(0, 7, 1.02f);
+  EXPECT_FLOAT_EQ(filled(), 1.01f);
+}
+
+TEST_F(FillOfAPixel, GoesByIntensity) {
+  accept(-3, 0, 1, 0.8f);
+  accept(5, 0, 3, 0.5f);
+  EXPECT_FLOAT_EQ(filled(), 3) << "the nearer surface, which looks alike";
+}
+
+TEST_F(FillOfAPixel, TakesNoPlaneThatIsOutOfRange) {
+  accept(-3, 0, 1);
+  accept(5, 0, 3);
+  views_.fixture.schedule().parameters.range.z = m_.z * 2;
+  EXPECT_FLOAT_EQ(filled(), 3);
+}
+
+TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
+  Options options = wide_range();
+  AgreeingViews views(options);
+  KernelFixture& fixture = views.fixture;
+  const ivec2 pixel(48, 48);
+  const vec3 m = views.plane(0);
+  const auto is_filled = [&](unsigned how, float cost, float displacement) {
+    fixture.view(0).hypotheses(pixel.y, pixel.x) = cv::Vec4f(2 * m.x, 2 * m.y, 2 * m.z, cost);
+    fixture.view(0).priors(pixel.y, pixel.x) = cv::Vec4f(m.x, m.y, m.z, 1);
+    fixture.view(0).checks(pixel.y, pixel.x) =
+        cv::Vec4f(0.1f, displacement, 0.5f, REASON_INCONSISTENT);
+    fixture.pass().candidates = how;
+    kernel::cpu::adopt_fill_pixel(fixture.context(), pixel);
+    return fixture.view(0).hypotheses(pixel.y, pixel.x)[2] == m.z;
+  };
+  const float beyond = static_cast<float>(options.consistency_pixels) + 0.5f;
+  // Unrelated images: the plane that is offered matches badly.
+  EXPECT_FALSE(is_filled(FILL_WITH_MATCHES, 0.3f, 0.5f));
+  EXPECT_EQ(static_cast<int>(fixture.view(0).checks(pixel.y, pixel.x)[3]), REASON_INCONSISTENT);
+  EXPECT_TRUE(is_filled(FILL_WITH_MATCHES, 1.9f, 0.5f)) << "as bad a match as any";
+  EXPECT_TRUE(is_filled(FILL_WITH_MATCHES, 0.3f, beyond)) << "perhaps occluded";
+  EXPECT_TRUE(is_filled(0, 0.3f, 0.5f)) << "rejected for good";
+}
+
+}  // namespace
+}  // namespace widestereo::test

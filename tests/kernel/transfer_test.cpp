@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: MIT
+// Planes warped into the other view, or the next frame.
+#include <gtest/gtest.h>
+
+#include "kernel_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+using kernel::ivec2;
+using kernel::vec3;
+
+TEST(Transfer, CarriesAPlaneIntoTheOtherView) {
+  Options options;
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  KernelFixture fixture(fisheye_rig(96), options);
+  // One slanted plane in front of the rig, held by all pixels of view 0 that see it.
+  const Eigen::Vector3d m(0.05, 0.1, 0.5);
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const cv::Vec4f ray = fixture.view(0).rays(y, x);
+      const double w = m.dot(Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>());
+      const vec3 mk = to_kernel(m);
+      fixture.view(0).hypotheses(y, x) =
+          w > 0.02 ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
+    }
+  }
+  fixture.set_reference(1);
+  fixture.pass().other = 0;
+  const auto context = fixture.context();
+  const auto run = [&](auto function) {
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) function(context, ivec2(x, y));
+    }
+  };
+  run(kernel::cpu::transfer_clear_pixel);
+  run(kernel::cpu::transfer_nearest_pixel);
+  run(kernel::cpu::transfer_winner_pixel);
+  run(kernel::cpu::transfer_gather_pixel);
+  const Eigen::Vector3d expected =
+      to_eigen(kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], to_kernel(m)));
+  int carried = 0;
+  int central = 0;
+  for (int y = 20; y < 76; ++y) {
+    for (int x = 20; x < 76; ++x) {
+      const cv::Vec4f h = fixture.view(1).hypotheses(y, x);
+      ++central;
+      carried += (Eigen::Vector3f(h[0], h[1], h[2]).cast<double>() - expected).norm() < 1e-5;
+    }
+  }
+  EXPECT_GT(carried, 0.99 * central);
+}
+
+TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
+  Options options = Options::preset_named("fast");
+  options.min_distance = 0.2;
+  options.max_distance = 100;
+  const Rig rig = fisheye_rig(96);
+  KernelFixture fixture(rig, options);
+  const Eigen::Isometry3d now_from_previous =
+      Eigen::Translation3d(0.05, -0.02, 0.1) *
+      Eigen::AngleAxisd(0.06, Eigen::Vector3d(0.3, 1, 0.2).normalized());
+  set_motion(fixture.schedule(), rig, now_from_previous, 7);
+  // The plane {X : n . X = d} of the rig's frame, seen by camera 1, whose frame is another one.
+  const Eigen::Vector3d n = Eigen::Vector3d(0.1, 0.15, 1).normalized();
+  const auto in_camera = [&](const Eigen::Isometry3d& previous_from_camera) {
+    const double d = 1.7 - n.dot(previous_from_camera.translation());
+    return Eigen::Vector3d(previous_from_camera.linear().transpose() * n / d);
+  };
+  const Eigen::Isometry3d& rig_from_camera = rig.views[1].world_from_camera;
+  const Eigen::Vector3d held = in_camera(rig_from_camera);
+  const Eigen::Vector3d expected = in_camera(now_from_previous.inverse() * rig_from_camera);
+  const vec3 mk = to_kernel(held);
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const cv::Vec4f ray = fixture.view(1).rays(y, x);
+      const double w = held.dot(Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>());
+      const bool seen = w > 0.02 && !(x >= 40 && x < 52 && y >= 40 && y < 52);
+      fixture.view(1).hypotheses(y, x) =
+          seen ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
+    }
+  }
+  fixture.set_reference(1);
+  fixture.pass().other = 1;
+  const auto context = fixture.context();
+  const auto run = [&](auto function) {
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) function(context, ivec2(x, y));
+    }
+  };
+  const auto carried_in = [&](const cv::Mat_<cv::Vec4f>& map) {
+    int carried = 0;
+    for (int y = 20; y < 76; ++y) {
+      for (int x = 20; x < 76; ++x) {
+        const cv::Vec4f h = map(y, x);
+        carried += (Eigen::Vector3f(h[0], h[1], h[2]).cast<double>() - expected).norm() < 1e-5;
+      }
+    }
+    return carried / (56.0 * 56.0);
+  };
+  run(kernel::cpu::transfer_clear_pixel);
+  run(kernel::cpu::transfer_nearest_pixel);
+  run(kernel::cpu::transfer_winner_pixel);
+  run(kernel::cpu::transfer_keep_pixel);
+  EXPECT_EQ(fixture.view(1).hypotheses(30, 30)[0], mk.x) << "still read by other pixels";
+  const double hole = 12.0 * 12 / (56 * 56);
+  EXPECT_GT(carried_in(fixture.view(1).priors), 0.97 - hole);
+  EXPECT_LT(carried_in(fixture.view(1).priors), 1 - 0.5 * hole) << "what had no plane has none now";
+  run(kernel::cpu::renew_pixel);
+  EXPECT_GT(carried_in(fixture.view(1).hypotheses), 0.99) << "surfaces continue into holes";
+}
+
+/// Warps planes from one view to another, or the same, whose pixels fetch theirs by `gather`.
+template <typename Gather>
+void transfer(KernelFixture& fixture, int from, int to, Gather gather) {
+  fixture.set_reference(to);
+  fixture.pass().other = from;
+  const auto context = fixture.context();
+  const auto run = [&](auto function, int over) {
+    const cv::Size size = fixture.view(over).rays.size();
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) function(context, ivec2(x, y));
+    }
+  };
+  run(kernel::cpu::transfer_clear_pixel, to);
+  run(kernel::cpu::transfer_nearest_pixel, from);
+  run(kernel::cpu::transfer_winner_pixel, from);
+  run(gather, to);
+}
+
+/// Share of the pixels in the middle that hold the plane m.
+double share_that_holds(const cv::Mat_<cv::Vec4f>& map, const vec3& m) {
+  int holding = 0;
+  int count = 0;
+  for (int y = map.rows / 4; y < map.rows * 3 / 4; ++y) {
+    for (int x = map.cols / 4; x < map.cols * 3 / 4; ++x, ++count) {
+      const cv::Vec4f& h = map(y, x);
+      holding += cv::norm(cv::Vec3f(h[0], h[1], h[2]) - cv::Vec3f(m.x, m.y, m.z)) < 1e-5;
+    }
+  }
+  return static_cast<double>(holding) / count;
+}
+
+TEST(Transfer, LeavesNoHolesInAViewThatSeesEverythingLarger) {
+  Rig rig = fisheye_rig(96);
+  rig.views[1].camera = fisheye_camera(160);
+  KernelFixture fixture(rig, wide_range());
+  const vec3 m(0.05f, 0.1f, 0.5f);
+  fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+  transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+  EXPECT_GT(
+      share_that_holds(fixture.view(1).hypotheses,
+                       kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m)),
+      0.99);
+}
+
+TEST(Transfer, OfSeveralPlanesTheNearestWins) {
+  KernelFixture fixture(fisheye_rig(96), wide_range());
+  const vec3 far(0.05f, 0.1f, 0.5f);
+  const vec3 near = 1.5f * far;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const vec3& m = (x + y) % 2 == 0 ? near : far;
+      fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, 0.1f);
+    }
+  }
+  transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+  EXPECT_GT(
+      share_that_holds(fixture.view(1).hypotheses,
+                       kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], near)),
+      0.95);
+}
+
+TEST(Transfer, LeavesWhatIsSeenFromBehindOrOutOfRange) {
+  KernelFixture fixture(fisheye_rig(96), wide_range());
+  const auto share = [&](const vec3& m) {
+    fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+    transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+    return share_that_holds(
+        fixture.view(1).hypotheses,
+        kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m));
+  };
+  EXPECT_GT(share({0, 0, 0.5f}), 0.99);
+  fixture.schedule().parameters.range.w = 0.1f;  // 10 m at least
+  EXPECT_EQ(share({0, 0, 0.5f}), 0);
+  fixture.schedule().parameters.range.w = 100;
+  const Eigen::Vector3d centre = fixture.rig().views[1].world_from_camera.translation();
+  const vec3 between = to_kernel(centre.normalized() / (0.5 * centre.norm()));
+  fixture.schedule().parameters.patch_limits.z = 0;  // however oblique
+  EXPECT_EQ(share(between), 0);
+}
+
+TEST(Transfer, WithoutMotionEveryPixelKeepsItsPlane) {
+  const Rig rig = fisheye_rig(96);
+  KernelFixture fixture(rig, wide_range("fast"));
+  set_motion(fixture.schedule(), rig, Eigen::Isometry3d::Identity(), 1);
+  cv::Mat_<cv::Vec4f>& planes = fixture.view(0).hypotheses;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const cv::Vec4f r = fixture.view(0).rays(y, x);
+      const float w = 0.3f + 0.001f * static_cast<float>((7 * x + 13 * y) % 50);
+      planes(y, x) = cv::Vec4f(w * r[0], w * r[1], w * r[2], 0.1f);
+    }
+  }
+  transfer(fixture, 0, 0, kernel::cpu::transfer_keep_pixel);
+  int lost = 0;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      if (fixture.view(0).rays(y, x)[3] == 0) continue;
+      const cv::Vec4f& moved = fixture.view(0).priors(y, x);
+      const cv::Vec4f difference = moved - planes(y, x);
+      lost += cv::norm(cv::Vec3f(difference[0], difference[1], difference[2])) > 1e-6;
+    }
+  }
+  EXPECT_EQ(lost, 0);
+}
+
+TEST(Transfer, SurfacesContinueIntoHolesFromEveryDirection) {
+  KernelFixture fixture(fisheye_rig(96), wide_range("fast"));
+  fixture.set_reference(0);
+  const vec3 m(0.05f, 0.1f, 0.5f);
+  for (int i = 0; i < 9; ++i) {
+    if (i == 4) continue;
+    fixture.view(0).priors.setTo(cv::Scalar::all(0));
+    const int x = 48 + 8 * (i % 3 - 1);
+    const int y = 48 + 8 * (i / 3 - 1);
+    fixture.view(0).priors(y, x) = cv::Vec4f(m.x, m.y, m.z, 1);
+    kernel::cpu::renew_pixel(fixture.context(), {48, 48});
+    EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[2], m.z) << "from " << x << ", " << y;
+  }
+}
+
+}  // namespace
+}  // namespace widestereo::test
