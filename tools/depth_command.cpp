@@ -77,8 +77,8 @@ void report_little_accepted(const std::vector<ws::ViewResult>& views) {
   for (const ws::ViewResult& view : views) accepted += accepted_share(view);
   if (accepted >= little * static_cast<double>(views.size())) return;
   std::puts(
-      "Little was accepted: check the order of the images, the calibration and the range of "
-      "distances (`widestereo calibration check`).");
+      "Little was accepted: check the order of the images, the calibration and its unit, and the "
+      "range of distances (`widestereo calibration check`).");
 }
 
 void run_depth(const DepthArguments& arguments) {

@@ -98,7 +98,7 @@ struct WarmStart {
 /// Not thread-safe; matchers are independent of each other and must not outlive their device.
 class Matcher {
  public:
-  /// Called between submissions with the share done in [0, 1].
+  /// Called between submissions with the share done in [0, 1]. What it throws ends the match.
   using Progress = std::function<void(double)>;
 
   /// Views that a rig may have; with four levels (Options::levels) it is 12.

@@ -172,13 +172,27 @@ TEST_P(WarmStarts, ARefusedFrameChangesNothing) {
   expect_no_validation_messages(*device);
 }
 
-TEST(AbortedMatch, LeavesNoPlanesToStartFrom) {
-  Device device = Device::open("cpu");
-  Matcher matcher(device, frame(0).rig, options_of("fast"));
+TEST_P(WarmStarts, NeedAMatchThatWasNotAborted) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  device.emplace(open_validated(GetParam(), 1'000'000));  // in many submissions
+  const Options options = options_of("fast");
+  Matcher matcher(*device, frame(0).rig, options);
+  const StereoResult expected = matcher.match(images_of(frame(0)));
+  // With work left on the device, whose matcher may go at once, or be used again.
   const auto abort = [](double) { throw std::runtime_error("aborted"); };
-  EXPECT_THROW(matcher.match(images_of(frame(0)), abort), std::runtime_error);
+  {
+    Matcher abandoned(*device, frame(0).rig, options);
+    EXPECT_THROW(abandoned.match(images_of(frame(1)), abort), std::runtime_error);
+  }
+  EXPECT_THROW(matcher.match(images_of(frame(1)), abort), std::runtime_error);
   EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), {}); }),
               HasSubstr("no planes of a previous frame"));
+  EXPECT_THROW(matcher.match(images_of(frame(1)), abort), std::runtime_error);
+  const StereoResult result = matcher.match(images_of(frame(0)));
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_TRUE(same_bits(result.views[i].hypotheses, expected.views[i].hypotheses)) << i;
+  }
+  expect_no_validation_messages(*device);
 }
 
 INSTANTIATE_TEST_SUITE_P(Devices, WarmStarts, ::testing::Values("cpu", "vulkan", "cuda"),
