@@ -39,10 +39,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
                               "set: ") +
                       FrameSettings::layouts)
       ->required();
-  rig.add_to(command, RigSettings::or_model);
-  command.get_option("--views")->description(
-      "Cameras of the calibration, from 0 (by comma); by default all, or as many as --folders "
-      "names");
+  rig.add_to(command, RigSettings::or_model, "; by default all, or as many as --folders names");
   command.add_option(
       "--masks", masks,
       "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "

@@ -28,11 +28,9 @@ void RigSettings::add_fields_of_view_to(CLI::App& command) {
       ->check(CLI::Range(1.0, 180.0));
 }
 
-void RigSettings::add_to(CLI::App& command, const std::string& or_other) {
+void RigSettings::add_to(CLI::App& command, const std::string& or_other, const std::string& which) {
   add_whole_rig_to(command, or_other);
-  command
-      .add_option("--views", views,
-                  "Cameras of the calibration, from 0, one for each image (by comma)")
+  command.add_option("--views", views, "Cameras of the calibration, from 0 (by comma)" + which)
       ->delimiter(',');
 }
 

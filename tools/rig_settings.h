@@ -29,8 +29,9 @@ struct RigSettings {
   void add_fields_of_view_to(CLI::App& command);
   /// Adds these and --calibration; `or_other`: what else it may be.
   void add_whole_rig_to(CLI::App& command, const std::string& or_other = "");
-  /// Adds these and --views.
-  void add_to(CLI::App& command, const std::string& or_other = "");
+  /// Adds these and --views; `which`: what cameras it names or may leave out.
+  void add_to(CLI::App& command, const std::string& or_other = "",
+              const std::string& which = ", one for each image");
   /// All calibrated views, with masks; `size` of the first image.
   widestereo::Rig whole_rig(cv::Size size) const;
   /// The calibrated views of `image_count` images, in their order, with masks; `size` of the first

@@ -379,10 +379,7 @@ void add_sequence_command(CLI::App& app) {
       "Match many frames, each started from the planes of the one before; run it again to resume");
   auto a = std::make_shared<SequenceArguments>();
   command->add_option("dataset", a->dataset, FrameSettings::layouts)->required();
-  a->rig.add_to(*command);
-  command->get_option("--views")->description(
-      "Cameras of the calibration, from 0 (by comma); by default the first two, or as many as "
-      "--folders names");
+  a->rig.add_to(*command, "", "; by default the first two, or as many as --folders names");
   a->size.add_to(*command);
   a->white_level.add_to(*command);
   a->sharpness.add_to(*command);

@@ -230,8 +230,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     if (size.empty()) {
       document.fail(
           "It holds no image size, so that it only does where images are given; add image_width "
-          "and "
-          "image_height.");
+          "and image_height.");
     }
     if (!in_file.empty() && !image_size.empty() && in_file != image_size) {
       document.fail("It is for images of " + std::to_string(in_file.width) + "x" +

@@ -11,10 +11,7 @@ using kernel::ivec2;
 using kernel::vec3;
 
 TEST(Checks, ConsistentPlanesPassAndWrongOnesFail) {
-  Options options;
-  options.min_distance = 0.2;
-  options.max_distance = 100;
-  KernelFixture fixture(fisheye_rig(96), options);
+  KernelFixture fixture(fisheye_rig(96), wide_range());
   const Eigen::Vector3d m(0.05, 0.1, 0.5);
   const Eigen::Vector3d moved =
       to_eigen(kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], to_kernel(m)));

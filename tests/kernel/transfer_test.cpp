@@ -10,11 +10,49 @@ namespace {
 using kernel::ivec2;
 using kernel::vec3;
 
+template <typename Function>
+void run_over(KernelFixture& fixture, int view, Function function) {
+  const auto context = fixture.context();
+  const cv::Size size = fixture.view(view).rays.size();
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) function(context, ivec2(x, y));
+  }
+}
+
+/// Warps planes from one view to another, or the same, whose pixels fetch theirs by `gather`.
+template <typename Gather>
+void transfer(KernelFixture& fixture, int from, int to, Gather gather) {
+  fixture.set_reference(to);
+  fixture.pass().other = from;
+  run_over(fixture, to, kernel::cpu::transfer_clear_pixel);
+  run_over(fixture, from, kernel::cpu::transfer_nearest_pixel);
+  run_over(fixture, from, kernel::cpu::transfer_winner_pixel);
+  run_over(fixture, to, gather);
+}
+
+/// The pixels that share_that_holds() looks at.
+cv::Rect middle_of(cv::Size size) {
+  return {size.width / 5, size.height / 5, size.width - 2 * (size.width / 5),
+          size.height - 2 * (size.height / 5)};
+}
+
+/// Share of the pixels in the middle that hold the plane m.
+double share_that_holds(const cv::Mat_<cv::Vec4f>& map, const vec3& m) {
+  const cv::Rect middle = middle_of(map.size());
+  int holding = 0;
+  for (const cv::Vec4f& h : cv::Mat_<cv::Vec4f>(map(middle))) {
+    holding += cv::norm(cv::Vec3f(h[0], h[1], h[2]) - cv::Vec3f(m.x, m.y, m.z)) < 1e-5;
+  }
+  return static_cast<double>(holding) / middle.area();
+}
+
+/// The plane m of view 0 in view 1's frame.
+vec3 in_view_1(KernelFixture& fixture, const vec3& m) {
+  return kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m);
+}
+
 TEST(Transfer, CarriesAPlaneIntoTheOtherView) {
-  Options options;
-  options.min_distance = 0.2;
-  options.max_distance = 100;
-  KernelFixture fixture(fisheye_rig(96), options);
+  KernelFixture fixture(fisheye_rig(96), wide_range());
   // One slanted plane in front of the rig, held by all pixels of view 0 that see it.
   const Eigen::Vector3d m(0.05, 0.1, 0.5);
   for (int y = 0; y < 96; ++y) {
@@ -26,38 +64,13 @@ TEST(Transfer, CarriesAPlaneIntoTheOtherView) {
           w > 0.02 ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
     }
   }
-  fixture.set_reference(1);
-  fixture.pass().other = 0;
-  const auto context = fixture.context();
-  const auto run = [&](auto function) {
-    for (int y = 0; y < 96; ++y) {
-      for (int x = 0; x < 96; ++x) function(context, ivec2(x, y));
-    }
-  };
-  run(kernel::cpu::transfer_clear_pixel);
-  run(kernel::cpu::transfer_nearest_pixel);
-  run(kernel::cpu::transfer_winner_pixel);
-  run(kernel::cpu::transfer_gather_pixel);
-  const Eigen::Vector3d expected =
-      to_eigen(kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], to_kernel(m)));
-  int carried = 0;
-  int central = 0;
-  for (int y = 20; y < 76; ++y) {
-    for (int x = 20; x < 76; ++x) {
-      const cv::Vec4f h = fixture.view(1).hypotheses(y, x);
-      ++central;
-      carried += (Eigen::Vector3f(h[0], h[1], h[2]).cast<double>() - expected).norm() < 1e-5;
-    }
-  }
-  EXPECT_GT(carried, 0.99 * central);
+  transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
+  EXPECT_GT(share_that_holds(fixture.view(1).hypotheses, in_view_1(fixture, to_kernel(m))), 0.99);
 }
 
 TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
-  Options options = Options::preset_named("fast");
-  options.min_distance = 0.2;
-  options.max_distance = 100;
   const Rig rig = fisheye_rig(96);
-  KernelFixture fixture(rig, options);
+  KernelFixture fixture(rig, wide_range("fast"));
   const Eigen::Isometry3d now_from_previous =
       Eigen::Translation3d(0.05, -0.02, 0.1) *
       Eigen::AngleAxisd(0.06, Eigen::Vector3d(0.3, 1, 0.2).normalized());
@@ -70,7 +83,7 @@ TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
   };
   const Eigen::Isometry3d& rig_from_camera = rig.views[1].world_from_camera;
   const Eigen::Vector3d held = in_camera(rig_from_camera);
-  const Eigen::Vector3d expected = in_camera(now_from_previous.inverse() * rig_from_camera);
+  const vec3 expected = to_kernel(in_camera(now_from_previous.inverse() * rig_from_camera));
   const vec3 mk = to_kernel(held);
   for (int y = 0; y < 96; ++y) {
     for (int x = 0; x < 96; ++x) {
@@ -81,65 +94,15 @@ TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
           seen ? cv::Vec4f(mk.x, mk.y, mk.z, 0.1f) : cv::Vec4f(0, 0, 0, 2);
     }
   }
-  fixture.set_reference(1);
-  fixture.pass().other = 1;
-  const auto context = fixture.context();
-  const auto run = [&](auto function) {
-    for (int y = 0; y < 96; ++y) {
-      for (int x = 0; x < 96; ++x) function(context, ivec2(x, y));
-    }
-  };
-  const auto carried_in = [&](const cv::Mat_<cv::Vec4f>& map) {
-    int carried = 0;
-    for (int y = 20; y < 76; ++y) {
-      for (int x = 20; x < 76; ++x) {
-        const cv::Vec4f h = map(y, x);
-        carried += (Eigen::Vector3f(h[0], h[1], h[2]).cast<double>() - expected).norm() < 1e-5;
-      }
-    }
-    return carried / (56.0 * 56.0);
-  };
-  run(kernel::cpu::transfer_clear_pixel);
-  run(kernel::cpu::transfer_nearest_pixel);
-  run(kernel::cpu::transfer_winner_pixel);
-  run(kernel::cpu::transfer_keep_pixel);
+  transfer(fixture, 1, 1, kernel::cpu::transfer_keep_pixel);
   EXPECT_EQ(fixture.view(1).hypotheses(30, 30)[0], mk.x) << "still read by other pixels";
-  const double hole = 12.0 * 12 / (56 * 56);
-  EXPECT_GT(carried_in(fixture.view(1).priors), 0.97 - hole);
-  EXPECT_LT(carried_in(fixture.view(1).priors), 1 - 0.5 * hole) << "what had no plane has none now";
-  run(kernel::cpu::renew_pixel);
-  EXPECT_GT(carried_in(fixture.view(1).hypotheses), 0.99) << "surfaces continue into holes";
-}
-
-/// Warps planes from one view to another, or the same, whose pixels fetch theirs by `gather`.
-template <typename Gather>
-void transfer(KernelFixture& fixture, int from, int to, Gather gather) {
-  fixture.set_reference(to);
-  fixture.pass().other = from;
-  const auto context = fixture.context();
-  const auto run = [&](auto function, int over) {
-    const cv::Size size = fixture.view(over).rays.size();
-    for (int y = 0; y < size.height; ++y) {
-      for (int x = 0; x < size.width; ++x) function(context, ivec2(x, y));
-    }
-  };
-  run(kernel::cpu::transfer_clear_pixel, to);
-  run(kernel::cpu::transfer_nearest_pixel, from);
-  run(kernel::cpu::transfer_winner_pixel, from);
-  run(gather, to);
-}
-
-/// Share of the pixels in the middle that hold the plane m.
-double share_that_holds(const cv::Mat_<cv::Vec4f>& map, const vec3& m) {
-  int holding = 0;
-  int count = 0;
-  for (int y = map.rows / 4; y < map.rows * 3 / 4; ++y) {
-    for (int x = map.cols / 4; x < map.cols * 3 / 4; ++x, ++count) {
-      const cv::Vec4f& h = map(y, x);
-      holding += cv::norm(cv::Vec3f(h[0], h[1], h[2]) - cv::Vec3f(m.x, m.y, m.z)) < 1e-5;
-    }
-  }
-  return static_cast<double>(holding) / count;
+  const double hole = 12.0 * 12 / middle_of({96, 96}).area();
+  EXPECT_GT(share_that_holds(fixture.view(1).priors, expected), 0.97 - hole);
+  EXPECT_LT(share_that_holds(fixture.view(1).priors, expected), 1 - 0.5 * hole)
+      << "what had no plane has none now";
+  run_over(fixture, 1, kernel::cpu::renew_pixel);
+  EXPECT_GT(share_that_holds(fixture.view(1).hypotheses, expected), 0.99)
+      << "surfaces continue into holes";
 }
 
 TEST(Transfer, LeavesNoHolesInAViewThatSeesEverythingLarger) {
@@ -149,10 +112,7 @@ TEST(Transfer, LeavesNoHolesInAViewThatSeesEverythingLarger) {
   const vec3 m(0.05f, 0.1f, 0.5f);
   fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
   transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
-  EXPECT_GT(
-      share_that_holds(fixture.view(1).hypotheses,
-                       kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m)),
-      0.99);
+  EXPECT_GT(share_that_holds(fixture.view(1).hypotheses, in_view_1(fixture, m)), 0.99);
 }
 
 TEST(Transfer, OfSeveralPlanesTheNearestWins) {
@@ -166,10 +126,7 @@ TEST(Transfer, OfSeveralPlanesTheNearestWins) {
     }
   }
   transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
-  EXPECT_GT(
-      share_that_holds(fixture.view(1).hypotheses,
-                       kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], near)),
-      0.95);
+  EXPECT_GT(share_that_holds(fixture.view(1).hypotheses, in_view_1(fixture, near)), 0.95);
 }
 
 TEST(Transfer, LeavesWhatIsSeenFromBehindOrOutOfRange) {
@@ -177,9 +134,7 @@ TEST(Transfer, LeavesWhatIsSeenFromBehindOrOutOfRange) {
   const auto share = [&](const vec3& m) {
     fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
     transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
-    return share_that_holds(
-        fixture.view(1).hypotheses,
-        kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[1], m));
+    return share_that_holds(fixture.view(1).hypotheses, in_view_1(fixture, m));
   };
   EXPECT_GT(share({0, 0, 0.5f}), 0.99);
   fixture.schedule().parameters.range.w = 0.1f;  // 10 m at least
