@@ -131,6 +131,7 @@ struct PassParameters {
   int steps;          // sweep: inverse distances; regression: of its grid of neighbours, in the radius
   float deviation;    // regression: standard deviation (source pixels) that is enough; 0: normals only
   int places;         // ambiguity: other places tried for a better match
+  float tolerance;    // regression: squared scale of its robust weights, as a share of the first round's
 };
 
 // Push constants after those, where an application's image is read or map is written (Vulkan).

@@ -2,8 +2,9 @@
 // The plane of a neighbourhood: inverse distance is exactly linear in the ray, so that it is a linear least-squares
 // problem, here a robust one, weighted by how precisely each pixel was measured.
 
-// Squared scale of the robust weights, in variances of the neighbour and of the pixel itself. Its own counts little: on
-// weak texture it would make the scale so wide that other surfaces count as the pixel's.
+// Squared scale of the robust weights, in variances of the neighbour and of the pixel itself; less of both from round to
+// round, as planes become smooth. Its own counts little: on weak texture it would make the scale so wide that other
+// surfaces count as the pixel's.
 #define NEIGHBOUR_SHARE 4.5f
 #define OWN_SHARE 0.3f
 #define LARGEST_SQUARED_SCALE 0.72f  // px^2
@@ -35,7 +36,8 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.information = vec3(0.0f, 0.0f, 0.0f);
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float inverse_scale = PARAMETERS.support.y;
-  float of_own = OWN_SHARE * own.x;
+  float of_own = OWN_SHARE * PASS.tolerance * own.x;
+  float of_neighbour = NEIGHBOUR_SHARE * PASS.tolerance;
   radius = max(radius, SMALLEST_FIT_RADIUS);
   int step = max(radius / PASS.steps, 1);
   radius = min(radius, step * PASS.steps);
@@ -73,7 +75,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float displacement = residual * measure.y;
       // Geman and McClure's weight: other surfaces, however precise, must not outvote the pixel's own. Everything that
       // weighs shares one division.
-      float scale2 = min(NEIGHBOUR_SHARE * measure.x + of_own, LARGEST_SQUARED_SCALE);
+      float scale2 = min(of_neighbour * measure.x + of_own, LARGEST_SQUARED_SCALE);
       float doubt = scale2 + displacement * displacement;
       float remoteness = 1.0f + fall_off * (squared_dy + dx * dx);
       float unlikeness = root_of_unlikeness(measure.w - own.w, inverse_scale);

@@ -26,7 +26,7 @@ static_assert(sizeof(kernel::ViewPair) == 48);
 static_assert(offsetof(kernel::MatchParameters, cameras) == 96);
 static_assert(offsetof(kernel::MatchParameters, pairs) == 96 + 96 * MAX_VIEWS);
 static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
-static_assert(sizeof(kernel::PassParameters) == 64);
+static_assert(sizeof(kernel::PassParameters) == 68);
 
 kernel::ViewPair view_pair(const Eigen::Isometry3d& source_from_reference) {
   const Eigen::Matrix<float, 3, 4> t = source_from_reference.matrix().topRows<3>().cast<float>();
@@ -214,8 +214,11 @@ class Builder {
           if (i == 0 && options_.subpixel_match) match_subpixel(views);
           const bool last = i + 1 == options_.level_regressions[place];
           // Costs are not needed before the last round, those of before lie near enough.
-          const Kernel adopt = level == 0 ? until_vote() : last ? Kernel::adopt : Kernel::adopt_point;
-          regress(views, precision_of_round(i), level > 0 && i > 0 ? HELD_UNSEEN : 0, adopt);
+          const Kernel adopt = level == 0 ? until_vote()
+                               : last     ? Kernel::adopt
+                                          : Kernel::adopt_point;
+          regress(views, level == 0 ? round(i) : coarse_round(i),
+                  level > 0 && i > 0 ? HELD_UNSEEN : 0, adopt);
         }
         if (level > 0) continue;
         repair_and_vote();
@@ -223,7 +226,7 @@ class Builder {
     }
     if (options_.level_regressions.back() > 0) {
       measure(views_of(0));
-      regress(views_of(0), 0, 0, Kernel::adopt);
+      regress(views_of(0), normals_after(options_.level_regressions.back()), 0, Kernel::adopt);
     }
   }
 
@@ -322,7 +325,7 @@ class Builder {
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const bool last = i + 1 == options_.warm_regressions;
       const unsigned how = (last ? REGRESS_NORMALS : 0) | (i > 0 ? HELD_UNSEEN : 0);
-      regress(views_of(0), precision_of_round(i), how, last ? until_vote() : Kernel::adopt_point,
+      regress(views_of(0), round(i), how, last ? until_vote() : Kernel::adopt_point,
               warm_regression_steps());
     }
     repair_and_vote();
@@ -397,13 +400,24 @@ class Builder {
     }
   }
 
-  /// What a neighbourhood must determine: more from round to round, as outliers vanish and
-  /// neighbours become smooth.
-  double precision_of_round(int i) const {
+  /// What a round of regressions asks of neighbourhoods.
+  struct Round {
+    double precision;  ///< what they must determine; 0: normals alone
+    double tolerance;  ///< of other surfaces, as a share of the first round's
+  };
+
+  /// More from round to round, as outliers vanish and neighbours become smooth.
+  Round round(int i) const {
     constexpr double share = 0.6;
     constexpr double finest = 1e-6;  // always the whole neighbourhood; 0 would mean normals alone
-    return std::max(options_.regression_precision * std::pow(share, i), finest);
+    const double narrowed = std::pow(share, i);
+    return {std::max(options_.regression_precision * narrowed, finest), narrowed};
   }
+
+  /// On coarse levels blank walls are still found from farther edges.
+  Round coarse_round(int i) const { return {round(i).precision, 1}; }
+
+  Round normals_after(int rounds) const { return {0, round(rounds - 1).tolerance}; }
 
   void measure(Views views) { add(Kernel::measure, pass_of(views), views, 0); }
 
@@ -416,20 +430,21 @@ class Builder {
     return std::max(std::min(options_.regression_steps, fewest), options_.regression_steps / 2);
   }
 
-  /// The views must have been measured. `precision`: 0 leaves the distances as they are; `how`, and
-  /// the kernel that adopts the planes: see shaders/regression.glsl.
-  void regress(Views views, double precision, unsigned how, Kernel adopt) {
-    regress(views, precision, how, adopt, options_.regression_steps);
+  /// The views must have been measured. `how`, and the kernel that adopts the planes: see
+  /// shaders/regression.glsl.
+  void regress(Views views, Round round, unsigned how, Kernel adopt) {
+    regress(views, round, how, adopt, options_.regression_steps);
   }
 
   /// `steps`: of the grid of neighbours.
-  void regress(Views views, double precision, unsigned how, Kernel adopt, int steps) {
+  void regress(Views views, Round round, unsigned how, Kernel adopt, int steps) {
     kernel::PassParameters pass = pass_of(views);
     pass.iteration = ++regressions_;
     // Four times as much for normals alone: a slope needs a wider base than a distance.
-    pass.radius = (precision == 0 ? 4 : 1) * options_.regression_radius;
+    pass.radius = (round.precision == 0 ? 4 : 1) * options_.regression_radius;
     pass.steps = steps;
-    pass.deviation = static_cast<float>(precision);
+    pass.deviation = static_cast<float>(round.precision);
+    pass.tolerance = static_cast<float>(round.tolerance);
     pass.candidates = how;
     add(Kernel::regress, pass, views, 0);
     add(adopt, pass, views, adopt == Kernel::adopt ? 1 : 0);

@@ -21,7 +21,7 @@ PatchOperations patch_operations(const KernelConstants& constants);
 struct FitOperations {
   int of_neighbour = 67;  ///< in the loop over a row of neighbours
   int of_row = 1;
-  int of_fit = 41;  ///< around both loops, after random numbers
+  int of_fit = 43;  ///< around both loops, after random numbers
 };
 
 /// Neighbours on a side of the grid to which a plane is fitted.

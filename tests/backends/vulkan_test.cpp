@@ -426,7 +426,7 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   FaultyLoader::faults() = {.largest_resource = 1000};
   EXPECT_THAT(message_of_match(), HasSubstr("its maxResourceSize is 1 MiB"));
   FaultyLoader::faults() = {.largest_push_constants = 16};
-  EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 64"));
+  EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 68"));
 }
 
 TEST_F(VulkanFailures, MissingFunctionsAreNamed) {

@@ -59,11 +59,12 @@ class Regression : public ::testing::Test {
 
   /// m of the regressed plane; zero where there is none.
   Eigen::Vector3d regressed(ivec2 pixel, int radius, double precision, int steps = 4,
-                            unsigned how = 0) {
+                            unsigned how = 0, float tolerance = 1) {
     fixture_.pass().radius = radius;
     fixture_.pass().steps = steps;
     fixture_.pass().deviation = static_cast<float>(precision);
     fixture_.pass().candidates = how;
+    fixture_.pass().tolerance = tolerance;
     kernel::cpu::regress_pixel(fixture_.context(), pixel);
     const cv::Vec4f prior = fixture_.view(0).priors(pixel.y, pixel.x);
     return {prior[0], prior[1], prior[2]};
@@ -221,6 +222,18 @@ TEST_F(Regression, DoesNotBlendSurfacesThatAreMeasuredBadly) {
                           return displacement(pixel, regressed(pixel, 18, 0.015), step(pixel.x));
                         }),
             0.3);
+}
+
+TEST_F(Regression, LaterRoundsTellSmoothSurfacesApartThatLieNearEachOther) {
+  const auto step = [](int x) -> Eigen::Vector3d { return x < 48 ? wall : 1.3 * wall; };  // 0.45 px
+  measure(step, 0.02, 0.1);
+  for (cv::Vec4f& check : fixture_.view(0).checks) check[0] = 0.15f * 0.15f;
+  const auto error = [&](float tolerance) {
+    return over_pixels(42, 53, [&](ivec2 pixel) {
+      return displacement(pixel, regressed(pixel, 18, 0.015, 4, 0, tolerance), step(pixel.x));
+    });
+  };
+  EXPECT_LT(error(0.36f), 0.7 * error(1));
 }
 
 TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {

@@ -121,11 +121,13 @@ TEST(Passes, OfAWarmSearchBringPlanesFromAllSides) {
 TEST(Passes, OfTheRegressionAskForMoreFromRoundToRound) {
   const Options options = Options::preset_named("fast");
   const auto all = passes(make_schedule(rig_of(2), options), Kernel::regress);
-  const std::vector<double> shares = {1, 1, 0.6, 1, 0.6, 0.36, 0};  // at last normals alone
+  const std::vector<double> shares = {1, 1, 0.6, 1, 0.6, 0.36, 0};       // at last normals alone
+  const std::vector<double> tolerances = {1, 1, 1, 1, 0.6, 0.36, 0.36};  // less on the finest level
   ASSERT_EQ(all.size(), shares.size());
   std::set<int> draws;
   for (std::size_t i = 0; i < all.size(); ++i) {
     EXPECT_FLOAT_EQ(all[i].deviation, static_cast<float>(options.regression_precision * shares[i]));
+    EXPECT_FLOAT_EQ(all[i].tolerance, static_cast<float>(tolerances[i]));
     EXPECT_EQ(all[i].radius, (shares[i] > 0 ? 1 : 4) * options.regression_radius);
     draws.insert(all[i].iteration);
   }

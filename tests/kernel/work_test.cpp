@@ -76,6 +76,7 @@ counting::Counts counts_of_fit(KernelFixture& fixture, cv::Point pixel, int radi
   fixture.set_reference(0);
   fixture.view(0).checks.setTo(cv::Scalar(0.01, 3, 0.5, 0.5));
   fixture.pass().steps = steps;
+  fixture.pass().tolerance = 1;
   const counting::Context context = counting::context_of(fixture);
   const counting::vec3 ray(0, 0, 1), east(TANGENT_SCALE, 0, 0), south(0, TANGENT_SCALE, 0);
   const counting::LocalPlane guess{0.5f, 0.0f, 0.0f};
