@@ -17,3 +17,4 @@
 #include "ambiguity.glsl"
 #include "fill.glsl"
 #include "vote.glsl"
+#include "normal_vote.glsl"

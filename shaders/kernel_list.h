@@ -19,6 +19,7 @@ KERNEL(adopt, REFERENCE)            // takes those planes over
 KERNEL(fill, REFERENCE)             // planes of accepted pixels for the rejected ones around them
 KERNEL(adopt_fill, REFERENCE)       // takes those planes over and marks the pixels
 KERNEL(vote, REFERENCE)             // planes which most of the planes around agree with
+KERNEL(vote_normal, REFERENCE)      // normals which most of the planes around agree with
 KERNEL(transfer_keep, REFERENCE)    // keeps a view's own planes, moved on from the previous frame
 KERNEL(renew, REFERENCE)            // starts a view from those
 KERNEL(interpolate, REFERENCE)      // intensities of a view at half pixels

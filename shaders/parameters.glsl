@@ -24,6 +24,10 @@
 #define VOTE_RIVALS 2
 #define VOTE_MIDDLE_RADIUS 1
 
+// The grid of the pixels that vote on a normal.
+#define NORMAL_VOTE_RADIUS 6
+#define NORMAL_VOTE_STEP 2
+
 // What options and results are as numbers (include/widestereo/options.h, matcher.h).
 #define WARP_EXACT 0
 #define WARP_AFFINE 1

@@ -113,6 +113,8 @@ struct Options {
   /// pixels away and likeness of intensity in the other view speak most, 0..64; 0 = it keeps its
   /// own.
   int vote_radius = 10;
+  /// At the end, pixels take the normal, of those around, that most planes around agree with.
+  bool normal_vote = true;
   /// Share of its cost by which the nearest planes must match better than the farthest, so that sky
   /// comes out as far, 0..1.
   double far_preference = 0;

@@ -32,6 +32,10 @@ long long estimated_work(const Dispatch& dispatch, const KernelConstants& consta
       const long long voters = 2 * dispatch.pass.radius / VOTE_STEP + 1;
       return dispatch.samples + samples_of_voter * voters * voters * dispatch.pixels;
     }
+    case Kernel::vote_normal: {
+      constexpr long long voters = 2 * NORMAL_VOTE_RADIUS / NORMAL_VOTE_STEP + 1;
+      return samples_of_voter * voters * voters * dispatch.pixels;
+    }
     case Kernel::check:
       return dispatch.samples + of_windows;
     default:

@@ -224,10 +224,17 @@ class Builder {
         repair_and_vote();
       }
     }
-    if (options_.level_regressions.back() > 0) {
-      measure(views_of(0));
-      regress(views_of(0), normals_after(options_.level_regressions.back()), 0, Kernel::adopt);
-    }
+    if (options_.level_regressions.back() > 0) find_normals();
+  }
+
+  void find_normals() {
+    measure(views_of(0));
+    const bool vote = options_.normal_vote;
+    regress(views_of(0), normals_after(options_.level_regressions.back()), 0,
+            vote ? Kernel::adopt_point : Kernel::adopt);
+    if (!vote) return;
+    add(Kernel::vote_normal, pass_of(views_of(0)), views_of(0), 0);
+    adopt_voted();
   }
 
   Views views_of(int level) const { return {level * views_of_rig_, views_of_rig_}; }
@@ -465,6 +472,12 @@ class Builder {
     add_with_samples(
         Kernel::vote, pass, views_of(0),
         (1 + VOTE_RIVALS) * samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
+    adopt_voted();
+  }
+
+  /// What regressions left without a cost gets one, voted for or not.
+  void adopt_voted() {
+    kernel::PassParameters pass = pass_of(views_of(0));
     pass.candidates = HELD_UNSEEN;
     add(Kernel::adopt, pass, views_of(0), 1);
   }

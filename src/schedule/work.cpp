@@ -142,6 +142,7 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::subpixel:
       return {seen | half_pixels | plane | checks, half_pixels, checks};
     case Kernel::regress:
+    case Kernel::vote_normal:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:
       return {prior | plane | seen, half_pixels, plane};

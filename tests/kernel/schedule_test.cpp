@@ -134,6 +134,25 @@ TEST(Passes, OfTheRegressionAskForMoreFromRoundToRound) {
   EXPECT_EQ(draws.size(), all.size()) << "each has grids of its own";
 }
 
+TEST(Passes, OfNormalsComeLastAndMayBeVotedOn) {
+  const auto last_kernels = [](bool vote) {
+    Options options = Options::preset_named("fast");
+    options.normal_vote = vote;
+    std::vector<Kernel> kernels;
+    for (const Dispatch& dispatch : make_schedule(rig_of(2), options).dispatches) {
+      if (dispatch.kernel == Kernel::measure) kernels.clear();
+      kernels.push_back(dispatch.kernel);
+    }
+    return kernels;
+  };
+  using ::testing::ElementsAre;
+  EXPECT_THAT(last_kernels(true),
+              ElementsAre(Kernel::measure, Kernel::regress, Kernel::adopt_point,
+                          Kernel::vote_normal, Kernel::adopt, Kernel::check));
+  EXPECT_THAT(last_kernels(false),
+              ElementsAre(Kernel::measure, Kernel::regress, Kernel::adopt, Kernel::check));
+}
+
 TEST(Passes, OfRepairsSpareMatchesAndThoseOfTheFillingDoNot) {
   Options options = Options::preset_named("fast");
   options.fill_radius = 20;

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// Vote of the surroundings on normals. Where surfaces meet, the neighbourhood of a regression holds both, and its slopes
+// lie between theirs; those of the pixels beside it, which hold one surface alone, agree with each other.
+
+// Candidates: the pixel's own normal, in the middle, and those of its neighbours that far away.
+#define NORMAL_CANDIDATES 9
+#define NORMAL_CANDIDATE_REACH 3
+// Displacement (source pixels) up to which planes are of the pixel's surface.
+#define NORMAL_VOTE_DISPLACEMENT 0.4f
+// Normals support each other up to 14 degrees, by their cosines.
+#define SUPPORT_PER_COSINE 33.0f
+
+// Stores as prior (m, 1) the plane with the pixel's distance and that normal of the candidates which most of the planes
+// around support, weighted by nearness and likeness of intensity, and by their distance at the pixel; zero where there is
+// none. The views must have been measured.
+FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
+  vec4 measure = check_at(CONTEXT REFERENCE, pixel);
+  vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
+  if (is_usable(CONTEXT pixel, usable_ray) && held.w < INVALID_COST && measure.x < UNMEASURED_VARIANCE) {
+    vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+    ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+    float own = inverse_distance_of(held, ray);
+    float scale = measure.y / NORMAL_VOTE_DISPLACEMENT;
+    vec3 candidates[NORMAL_CANDIDATES];
+    float support[NORMAL_CANDIDATES];
+    UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
+      ivec2 q = ivec2(pixel.x + (i % 3 - 1) * NORMAL_CANDIDATE_REACH, pixel.y + (i / 3 - 1) * NORMAL_CANDIDATE_REACH);
+      candidates[i] = vec3(0.0f, 0.0f, 0.0f);
+      support[i] = 0.0f;
+      if (!in_image(size, q)) continue;
+      vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
+      vec3 m = vec3(plane.x, plane.y, plane.z);
+      if (plane.w < INVALID_COST && dot(m, ray) > 0.0f) candidates[i] = (1.0f / length(m)) * m;
+    }
+    float fall_off = 2.0f / float(NORMAL_VOTE_RADIUS * NORMAL_VOTE_RADIUS);
+    float inverse_scale = PARAMETERS.support.y;
+    for (int dy = -NORMAL_VOTE_RADIUS; dy <= NORMAL_VOTE_RADIUS; dy += NORMAL_VOTE_STEP) {
+      for (int dx = -NORMAL_VOTE_RADIUS; dx <= NORMAL_VOTE_RADIUS; dx += NORMAL_VOTE_STEP) {
+        ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
+        if (!in_image(size, q)) continue;
+        vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
+        if (plane.w >= INVALID_COST) continue;
+        vec3 m = vec3(plane.x, plane.y, plane.z);
+        float remoteness = root_of_growth(float(dx * dx + dy * dy) * fall_off);
+        float unlikeness = root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - measure.w, inverse_scale);
+        float weight = support_between(dot(m, ray), own, scale) / eighth_power(remoteness * unlikeness);
+        vec3 normal = (1.0f / length(m)) * m;
+        UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
+          support[i] += weight * max(1.0f - SUPPORT_PER_COSINE * (1.0f - dot(normal, candidates[i])), 0.0f);
+        }
+      }
+    }
+    // The pixel's own comes first.
+    vec3 elected = candidates[NORMAL_CANDIDATES / 2];
+    float most = support[NORMAL_CANDIDATES / 2];
+    UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
+      if (support[i] > most) {
+        most = support[i];
+        elected = candidates[i];
+      }
+    }
+    vec3 m = (own / dot(elected, ray)) * elected;
+    if (admissible(CONTEXT ray, m)) prior = vec4(m, 1.0f);
+  }
+  store_prior(CONTEXT REFERENCE, pixel, prior);
+}
