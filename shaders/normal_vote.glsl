@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Vote of the surroundings on normals. Where surfaces meet, the neighbourhood of a regression holds both, and its slopes
-// lie between theirs; those of the pixels beside it, which hold one surface alone, agree with each other.
+// Vote of the surroundings on normals. Where surfaces meet, the neighbourhood of a regression holds both, and its
+// slopes lie between theirs; those of the pixels beside it, which hold one surface alone, agree with each other.
 
 // Candidates: the pixel's own normal, in the middle, and those of its neighbours that far away.
 #define NORMAL_CANDIDATES 9
@@ -10,9 +10,9 @@
 // Normals support each other up to 14 degrees, by their cosines.
 #define SUPPORT_PER_COSINE 33.0f
 
-// Stores as prior (m, 1) the plane with the pixel's distance and that normal of the candidates which most of the planes
-// around support, weighted by nearness and likeness of intensity, and by their distance at the pixel; zero where there is
-// none. The views must have been measured.
+// Stores as prior (m, 1) the plane with the pixel's distance and that normal of the candidates which most of the
+// planes around support, weighted by nearness, likeness of intensity and agreement in distance at the pixel; zero where
+// there is none. The views must have been measured.
 FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);

@@ -14,7 +14,7 @@ struct Measurement {
   std::string preset;
   int size = 0;
   int window_radius = 0;
-  std::string options;  // every parameter as JSON
+  std::string options;                          // every parameter as JSON
   double wall = 0, wall_min = 0, wall_max = 0;  // milliseconds, the first a median
   double on_device = 0;                         // of the median run, which the kernels are of
   std::vector<widestereo::KernelTime> kernels;
