@@ -70,17 +70,6 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
   return files;
 }
 
-/// Pairs that fit their calibration have half or more (docs/accuracy.md).
-void report_little_accepted(const std::vector<ws::ViewResult>& views) {
-  constexpr double little = 0.4;
-  double accepted = 0;
-  for (const ws::ViewResult& view : views) accepted += accepted_share(view);
-  if (accepted >= little * static_cast<double>(views.size())) return;
-  std::puts(
-      "Little was accepted: check the order of the images, the calibration and its unit, and the "
-      "range of distances (`widestereo calibration check`).");
-}
-
 void run_depth(const DepthArguments& arguments) {
   const std::optional<ws::SfmModel> model = arguments.rig.sfm_model();
   const std::vector<std::string> files = files_of(arguments, model);
@@ -112,7 +101,10 @@ void run_depth(const DepthArguments& arguments) {
   if (!arguments.rig.masks.empty()) contents.origin["masks"] = arguments.rig.masks;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
-  if (!arguments.as_json) report_little_accepted(run.result.views);
+  if (arguments.as_json) return;
+  double accepted = 0;
+  for (const ws::ViewResult& view : run.result.views) accepted += accepted_share(view);
+  report_little_accepted(accepted / static_cast<double>(run.result.views.size()));
 }
 
 }  // namespace

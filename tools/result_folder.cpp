@@ -263,6 +263,14 @@ double accepted_share(const ws::ViewResult& view) {
   return share_of_usable(view, view.reasons == 0);
 }
 
+void report_little_accepted(double share) {
+  constexpr double little = 0.4;  // pairs that fit have half or more (docs/accuracy.md)
+  if (share >= little) return;
+  std::puts(
+      "Little was accepted: check the order of the images, the calibration and its unit, and the "
+      "range of distances (`widestereo calibration check`).");
+}
+
 void FolderFormat::add_maps_to(CLI::App& command) {
   command.add_option("--formats", maps, "Distance maps: tiff, pfm, png (several by comma)")
       ->delimiter(',')

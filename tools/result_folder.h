@@ -47,6 +47,10 @@ Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
 /// How much of a view's lens was accepted, in [0, 1].
 double accepted_share(const widestereo::ViewResult& view);
 
+/// Says what to check where so little is accepted of all views that the images hardly fit their
+/// calibration.
+void report_little_accepted(double share);
+
 struct FolderContents {
   const widestereo::Rig& rig;
   const std::vector<cv::Mat>& images;

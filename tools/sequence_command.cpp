@@ -369,6 +369,9 @@ void run_sequence(const SequenceArguments& arguments) {
   std::printf("%zu frames are in %s\n", run.folder().frames().size(), arguments.output.c_str());
   summarise(run.folder().frames(), false);
   summarise(run.folder().frames(), true);
+  double accepted = 0;
+  for (const Json& frame : run.folder().frames()) accepted += frame["accepted"].get<double>();
+  report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()));
 }
 
 }  // namespace

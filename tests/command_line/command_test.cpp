@@ -702,6 +702,21 @@ TEST_F(ShiftedPair, SwappedImagesAreMatchedWithAHint) {
   EXPECT_FALSE(has_hint(file("left.png") + " " + file("right.png")));
 }
 
+TEST_F(ShiftedPair, SequencesOfSwappedCamerasGiveAHint) {
+  for (const char* camera : {"cam0", "cam1"}) fs::create_directories(folder_ / camera);
+  fs::copy(folder_ / "left.png", folder_ / "cam0" / "1.png");
+  fs::copy(folder_ / "right.png", folder_ / "cam1" / "1.png");
+  const auto has_hint = [this](const std::string& order) {
+    const Outcome outcome = run("sequence " + folder_.path().string() + " -c " +
+                                file("calib.yaml") + " -o " + file("out" + order) + " --folders " +
+                                order + " --preset fast --device cpu --min-distance 0.3");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return outcome.output.find("Little was accepted: check the order") != std::string::npos;
+  };
+  EXPECT_TRUE(has_hint("cam1,cam0"));
+  EXPECT_FALSE(has_hint("cam0,cam1"));
+}
+
 TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
   const std::string output = "-o " + file("refined.yaml");
   expect_error(calibration("refine", "right.png", "left.png") + output,
