@@ -18,7 +18,9 @@ struct ConvertArguments {
 };
 
 void convert(const ConvertArguments& arguments) {
-  arguments.output.write(ws::read_calibration(arguments.input).rig);
+  const ws::Rig rig = ws::read_calibration(arguments.input).rig;
+  arguments.output.require_other_than(arguments.input);
+  arguments.output.write(rig);
   std::cout << "Wrote " << arguments.output.file << "\n";
 }
 

@@ -12,6 +12,8 @@ struct CalibrationOutput {
 
   /// Adds --to.
   void add_format_to(CLI::App& command);
+  /// Throws Error where the file is the calibration that is read: its format may hold more.
+  void require_other_than(const std::string& calibration) const;
   /// As write_kalibr() or write_basalt() does.
   void write(const widestereo::Rig& rig) const;
 };

@@ -112,6 +112,7 @@ void refine(const RefineArguments& arguments) {
                     " image(s); give one image of each camera, frame after frame, of two cameras "
                     "or more.");
   }
+  arguments.output.require_other_than(arguments.rig.calibration);
   ws::require_writable(arguments.output.file);
   const std::vector<ws::ViewMatches> pairs =
       match_frames(rig, arguments.images, arguments.white_level);

@@ -99,6 +99,20 @@ TEST_F(Output, GoesThroughLinksAndFifos) {
   close(reader);
 }
 
+TEST_F(Output, DoesNotReplaceTheCalibrationThatIsRead) {
+  const std::string before = bytes_of("calib.yaml");
+  fs::create_symlink("calib.yaml", folder_ / "link.yaml");
+  const std::string images = file("left.png") + " " + file("right.png");
+  for (const char* output : {"calib.yaml", "link.yaml"}) {
+    const std::string error = file(output) + " is the calibration that is read; choose another";
+    expect_error("calibration convert " + file("calib.yaml") + " " + file(output), error);
+    expect_error(
+        "calibration refine " + images + " -c " + file("calib.yaml") + " -o " + file(output),
+        error);
+  }
+  EXPECT_EQ(bytes_of("calib.yaml"), before);
+}
+
 #ifndef __SANITIZE_ADDRESS__  // which needs more memory than this to begin with
 TEST_F(Output, LackOfMemoryIsNamed) {
   cv::imwrite(file("big.png"), cv::Mat(12000, 12000, CV_8UC1, cv::Scalar(0)));
