@@ -5,8 +5,6 @@
 // Candidates: the pixel's own normal, in the middle, and those of its neighbours that far away.
 #define NORMAL_CANDIDATES 9
 #define NORMAL_CANDIDATE_REACH 3
-// Displacement (source pixels) up to which planes are of the pixel's surface.
-#define NORMAL_VOTE_DISPLACEMENT 0.4f
 // Normals support each other up to 14 degrees, by their cosines.
 #define SUPPORT_PER_COSINE 33.0f
 
@@ -22,7 +20,7 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
     ivec4 size = PARAMETERS.cameras[REFERENCE].size;
     float own = inverse_distance_of(held, ray);
-    float scale = measure.y / NORMAL_VOTE_DISPLACEMENT;
+    float scale = measure.y / VOTE_DISPLACEMENT;
     vec3 candidates[NORMAL_CANDIDATES];
     float support[NORMAL_CANDIDATES];
     UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
@@ -43,9 +41,8 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         if (plane.w >= INVALID_COST) continue;
         vec3 m = vec3(plane.x, plane.y, plane.z);
-        float remoteness = root_of_growth(float(dx * dx + dy * dy) * fall_off);
-        float unlikeness = root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - measure.w, inverse_scale);
-        float weight = support_between(dot(m, ray), own, scale) / eighth_power(remoteness * unlikeness);
+        float weight = support_between(dot(m, ray), own, scale) /
+                       remoteness_of_voter(CONTEXT q, dx, dy, fall_off, measure.w, inverse_scale);
         vec3 normal = (1.0f / length(m)) * m;
         UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
           support[i] += weight * max(1.0f - SUPPORT_PER_COSINE * (1.0f - dot(normal, candidates[i])), 0.0f);

@@ -39,6 +39,13 @@ FN float support_between(float w, float candidate, float scale) {
   return agreement * agreement;
 }
 
+// By how much less than the pixel itself one counts at q, (dx, dy) away: from 1 on. `fall_off`: per squared pixel.
+FN float remoteness_of_voter(CONTEXT_ARGUMENT ivec2 q, int dx, int dy, float fall_off, float intensity,
+                             float inverse_scale) {
+  return eighth_power(root_of_growth(float(dx * dx + dy * dy) * fall_off) *
+                      root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
+}
+
 // How many times brighter the reference is than the source around the pixel, for exposures and vignetting differ: from
 // the pixels that passed check_pixel() for this vote, which has left what the source shows of them.
 FN float gain_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
@@ -138,9 +145,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         if (plane.w >= INVALID_COST) continue;
         float w = inverse_distance_of(plane, ray);
-        float weight =
-            1.0f / eighth_power(root_of_growth(float(dx * dx + dy * dy) * fall_off) *
-                                root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
+        float weight = 1.0f / remoteness_of_voter(CONTEXT q, dx, dy, fall_off, intensity, inverse_scale);
         most += weight * support_between(w, own, scale);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
           support[i] += weight * support_between(w, candidates[i], scale);

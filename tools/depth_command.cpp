@@ -101,10 +101,7 @@ void run_depth(const DepthArguments& arguments) {
   if (!arguments.rig.masks.empty()) contents.origin["masks"] = arguments.rig.masks;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
-  if (arguments.as_json) return;
-  double accepted = 0;
-  for (const ws::ViewResult& view : run.result.views) accepted += accepted_share(view);
-  report_little_accepted(accepted / static_cast<double>(run.result.views.size()));
+  if (!arguments.as_json) report_little_accepted(accepted_share(run.result.views));
 }
 
 }  // namespace

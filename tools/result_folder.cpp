@@ -263,6 +263,14 @@ double accepted_share(const ws::ViewResult& view) {
   return share_of_usable(view, view.reasons == 0);
 }
 
+double accepted_share(const std::vector<ws::ViewResult>& views) {
+  double share = 0;
+  for (const ws::ViewResult& view : views) {
+    share += accepted_share(view) / static_cast<double>(views.size());
+  }
+  return share;
+}
+
 void report_little_accepted(double share) {
   constexpr double little = 0.4;  // pairs that fit have half or more (docs/accuracy.md)
   if (share >= little) return;

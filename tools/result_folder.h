@@ -46,6 +46,8 @@ Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
 
 /// How much of a view's lens was accepted, in [0, 1].
 double accepted_share(const widestereo::ViewResult& view);
+/// The mean of the views.
+double accepted_share(const std::vector<widestereo::ViewResult>& views);
 
 /// Says what to check where so little is accepted of all views that the images hardly fit their
 /// calibration.

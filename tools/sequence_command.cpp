@@ -149,10 +149,9 @@ struct Quality {
 };
 
 Quality quality_of(const ws::StereoResult& result) {
-  Quality quality;
+  Quality quality{.accepted = accepted_share(result.views)};
   const auto views = static_cast<double>(result.views.size());
   for (const ws::ViewResult& view : result.views) {
-    quality.accepted += accepted_share(view) / views;
     quality.mean_cost += ws::consistency_scores(view.differences, view.cost).mean_cost / views;
   }
   return quality;

@@ -21,6 +21,12 @@ long long neighbours_of_regression(const kernel::PassParameters& pass) {
   return side * side * (pass.deviation > 0 ? REGRESSION_ROUNDS : NORMAL_ROUNDS);
 }
 
+/// Of a pixel, for which a grid of this radius and step votes, in samples.
+long long work_of_voters(long long radius, long long step) {
+  const long long voters = 2 * radius / step + 1;
+  return samples_of_voter * voters * voters;
+}
+
 /// Of a dispatch, in samples; a kernel without patches may still look at every pixel's window.
 long long estimated_work(const Dispatch& dispatch, const KernelConstants& constants) {
   const long long side = 2 * constants.window_radius + 1;
@@ -28,14 +34,10 @@ long long estimated_work(const Dispatch& dispatch, const KernelConstants& consta
   switch (dispatch.kernel) {
     case Kernel::regress:
       return samples_of_neighbour * neighbours_of_regression(dispatch.pass) * dispatch.pixels;
-    case Kernel::vote: {
-      const long long voters = 2 * dispatch.pass.radius / VOTE_STEP + 1;
-      return dispatch.samples + samples_of_voter * voters * voters * dispatch.pixels;
-    }
-    case Kernel::vote_normal: {
-      constexpr long long voters = 2 * NORMAL_VOTE_RADIUS / NORMAL_VOTE_STEP + 1;
-      return samples_of_voter * voters * voters * dispatch.pixels;
-    }
+    case Kernel::vote:
+      return dispatch.samples + work_of_voters(dispatch.pass.radius, VOTE_STEP) * dispatch.pixels;
+    case Kernel::vote_normal:
+      return work_of_voters(NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP) * dispatch.pixels;
     case Kernel::check:
       return dispatch.samples + of_windows;
     default:

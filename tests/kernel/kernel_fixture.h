@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "cpu/kernels.h"
@@ -18,6 +19,10 @@ inline Eigen::Vector3d to_eigen(const kernel::vec3& v) {
 }
 inline kernel::vec3 to_kernel(const Eigen::Vector3d& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+inline double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / CV_PI;
 }
 
 /// TUM-VI-like double-sphere camera of `size` x `size` pixels that sees `max_theta` radians off
@@ -119,6 +124,11 @@ class KernelFixture {
   Schedule& schedule() { return schedule_; }
   const Rig& rig() const { return rig_; }
   kernel::cpu::ViewMemory& view(int i) { return views_[i]; }
+  /// A pixel's unit ray.
+  Eigen::Vector3d ray(int view, kernel::ivec2 pixel) const {
+    const cv::Vec4f& r = views_[view].rays(pixel.y, pixel.x);
+    return {r[0], r[1], r[2]};
+  }
 
   /// Makes the images' half pixels, as the schedule begins; after every change of an image.
   void interpolate() {

@@ -28,7 +28,7 @@ const Eigen::Vector3d blend(0, 0, 0.5);
 /// From a plane that was elected.
 double degrees_off(const Eigen::Vector3d& elected, const Eigen::Vector3d& expected) {
   if (elected.norm() == 0) return std::numeric_limits<double>::infinity();
-  return std::atan2(elected.cross(expected).norm(), elected.dot(expected)) * 180 / CV_PI;
+  return degrees_between(elected, expected);
 }
 
 class NormalVote : public ::testing::Test {
@@ -42,10 +42,7 @@ class NormalVote : public ::testing::Test {
 
   cv::Mat_<cv::Vec4f>& planes() { return fixture_.view(0).hypotheses; }
 
-  Eigen::Vector3d ray(ivec2 pixel) {
-    const cv::Vec4f r = fixture_.view(0).rays(pixel.y, pixel.x);
-    return {r[0], r[1], r[2]};
-  }
+  Eigen::Vector3d ray(ivec2 pixel) { return fixture_.ray(0, pixel); }
 
   void hold(ivec2 pixel, const Eigen::Vector3d& m) {
     planes()(pixel.y, pixel.x) = cv::Vec4f(static_cast<float>(m.x()), static_cast<float>(m.y()),

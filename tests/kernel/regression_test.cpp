@@ -17,10 +17,6 @@ constexpr int size = 96;
 constexpr double speed = 3;
 constexpr float grey = 0.5f;
 
-double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / CV_PI;
-}
-
 /// View 0 of evenly grey images, whose planes were measured with known precision.
 class Regression : public ::testing::Test {
  protected:
@@ -31,10 +27,7 @@ class Regression : public ::testing::Test {
     fixture_.set_reference(0);
   }
 
-  Eigen::Vector3d ray(ivec2 pixel) {
-    const cv::Vec4f r = fixture_.view(0).rays(pixel.y, pixel.x);
-    return {r[0], r[1], r[2]};
-  }
+  Eigen::Vector3d ray(ivec2 pixel) { return fixture_.ray(0, pixel); }
 
   /// Fills the view with the planes of `truth` by column, their displacement in the source wrong by
   /// `noise` pixels (standard deviation) and the tangent of their tilt by `tilt`.
