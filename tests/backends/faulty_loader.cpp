@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+
 #include "vulkan_fixture.h"
 
 namespace widestereo::test {
@@ -17,7 +19,6 @@ PFN_vkWaitForFences real_wait = nullptr;
 PFN_vkGetPipelineCacheData real_cache_data = nullptr;
 PFN_vkGetPhysicalDeviceProperties real_properties = nullptr;
 PFN_vkGetPhysicalDeviceFormatProperties real_formats = nullptr;
-PFN_vkGetPhysicalDeviceQueueFamilyProperties real_queue_families = nullptr;
 PFN_vkGetPhysicalDeviceImageFormatProperties real_image_limits = nullptr;
 
 Faults& faults() { return FaultyLoader::faults(); }
@@ -81,23 +82,11 @@ VKAPI_ATTR void VKAPI_CALL properties_since_1_1(VkPhysicalDevice, VkPhysicalDevi
   ADD_FAILURE() << "a device of Vulkan 1.0 has no vkGetPhysicalDeviceProperties2";
 }
 
-VKAPI_ATTR void VKAPI_CALL queue_families(VkPhysicalDevice device, std::uint32_t* count,
+VKAPI_ATTR void VKAPI_CALL queue_families(VkPhysicalDevice, std::uint32_t* count,
                                           VkQueueFamilyProperties* families) {
-  const std::uint32_t room = *count;
-  real_queue_families(device, count, families);
-  if (faults().more_family != 0) {
-    faults().families = ++*count;
-    if (families == nullptr) return;
-    if (*count <= room) {
-      families[*count - 1] = {};
-      families[*count - 1].queueFlags = faults().more_family;
-      families[*count - 1].timestampValidBits = faults().clock_of_more_family;
-    }
-    return;
-  }
-  for (std::uint32_t i = 0; families != nullptr && i < *count; ++i) {
-    families[i].queueFlags &= ~static_cast<VkQueueFlags>(VK_QUEUE_COMPUTE_BIT);
-  }
+  const auto all = static_cast<std::uint32_t>(faults().queue_families.size());
+  *count = families == nullptr ? all : std::min(*count, all);
+  if (families != nullptr) std::copy_n(faults().queue_families.begin(), *count, families);
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL image_limits(VkPhysicalDevice device, VkFormat format,
@@ -144,9 +133,8 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance(VkInstance instance, const
   if (wanted == "vkGetPhysicalDeviceProperties2" && faults().old_device) {
     return reinterpret_cast<PFN_vkVoidFunction>(&properties_since_1_1);
   }
-  if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" &&
-      (faults().no_compute_queues || faults().more_family != 0)) {
-    return wrap(real, real_queue_families, &queue_families);
+  if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" && !faults().queue_families.empty()) {
+    return reinterpret_cast<PFN_vkVoidFunction>(&queue_families);
   }
   if (wanted == "vkGetPhysicalDeviceImageFormatProperties") {
     return wrap(real, real_image_limits, &image_limits);

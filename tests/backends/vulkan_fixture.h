@@ -108,17 +108,15 @@ struct Faults {
   bool no_formats = false;
   bool no_filtering = false;  ///< images of no format can be filtered
   bool is_gpu = false;        ///< says that it is a discrete GPU
-  bool no_compute_queues = false;
-  VkQueueFlags more_family = 0;            ///< what one more queue family, the last, can do
-  std::uint32_t clock_of_more_family = 0;  ///< its timestampValidBits
-  bool old_device = false;                 ///< Vulkan 1.0
+  /// Instead of the device's own, if any.
+  std::vector<VkQueueFamilyProperties> queue_families = {};
+  bool old_device = false;  ///< Vulkan 1.0
   std::uint32_t largest_image = 0;
   VkDeviceSize largest_resource = 0;
   std::uint32_t largest_push_constants = 0;
   std::string missing_function = {};
   int growing_caches = 0;  ///< how often a pipeline cache grows while it is read
   int allocations = 0;
-  std::uint32_t families = 0;  ///< queue families, with more_family
   int submissions = 0;
   int waits = 0;
 };

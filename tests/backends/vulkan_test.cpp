@@ -28,6 +28,14 @@ DeviceRequest validated(long max_samples_per_dispatch = 0) {
   return request;
 }
 
+VkQueueFamilyProperties queue_family(VkQueueFlags can, std::uint32_t bits_of_clock = 64) {
+  VkQueueFamilyProperties family{};
+  family.queueFlags = can;
+  family.queueCount = 1;
+  family.timestampValidBits = bits_of_clock;
+  return family;
+}
+
 TEST(VulkanDevices, AreDescribedCompletely) {
   REQUIRE_VULKAN_OR_SKIP();
   const std::vector<DeviceInfo> devices = list_vulkan_devices(nullptr);
@@ -224,12 +232,12 @@ TEST(VulkanContexts, RefuseHandlesThatDoNotDo) {
   EXPECT_THAT(error(handles), HasSubstr("no queue family 1000"));
 
   const FaultyLoader::Scope scope;
-  FaultyLoader::faults().more_family = VK_QUEUE_TRANSFER_BIT;
+  FaultyLoader::faults().queue_families = {queue_family(VK_QUEUE_COMPUTE_BIT),
+                                           queue_family(VK_QUEUE_TRANSFER_BIT)};
   handles.get_instance_proc_addr = FaultyLoader::get_instance_proc_addr();
   handles.queue_family = 0;
   EXPECT_EQ(error(handles), "");
-  // Lavapipe has one family, after which the faulty loader puts another one.
-  handles.queue_family = FaultyLoader::faults().families - 1;
+  handles.queue_family = 1;
   EXPECT_THAT(error(handles), HasSubstr("cannot compute"));
 }
 
@@ -237,18 +245,23 @@ TEST(VulkanQueues, AreThoseThatTellTimeThenThoseThatDoNotDraw) {
   REQUIRE_VULKAN_OR_SKIP();
   const Application application;
   const FaultyLoader::Scope scope;
-  const auto family_with = [&](VkQueueFlags more_family, std::uint32_t clock) {
-    FaultyLoader::faults() = {.more_family = more_family, .clock_of_more_family = clock};
+  const auto chosen_of = [&](std::vector<VkQueueFamilyProperties> families) {
+    FaultyLoader::faults() = {.queue_families = std::move(families)};
     const auto functions = InstanceFunctions::load(FaultyLoader::get_instance_proc_addr(),
                                                    application.instance.handle());
     return compute_queue_family(functions, application.instance.physical_devices().at(0));
   };
-  // Lavapipe has one family, which draws and tells time.
-  const auto chosen = family_with(VK_QUEUE_COMPUTE_BIT, 64);
-  EXPECT_EQ(chosen, FaultyLoader::faults().families - 1);
-  EXPECT_EQ(family_with(VK_QUEUE_COMPUTE_BIT, 0), 0u);
-  EXPECT_EQ(family_with(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT, 64), 0u);
-  EXPECT_EQ(family_with(VK_QUEUE_TRANSFER_BIT, 64), 0u);
+  const auto drawing = queue_family(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT);
+  const auto computing = queue_family(VK_QUEUE_COMPUTE_BIT);
+  const auto computing_without_clock = queue_family(VK_QUEUE_COMPUTE_BIT, 0);
+  const auto copying = queue_family(VK_QUEUE_TRANSFER_BIT);
+  EXPECT_EQ(chosen_of({drawing, computing}), 1u);
+  EXPECT_EQ(chosen_of({drawing, copying, computing, computing}), 2u);
+  EXPECT_EQ(chosen_of({drawing, computing_without_clock}), 0u);
+  EXPECT_EQ(chosen_of({computing_without_clock, drawing}), 1u);
+  EXPECT_EQ(chosen_of({drawing, drawing}), 0u);
+  EXPECT_EQ(chosen_of({drawing, copying}), 0u);
+  EXPECT_EQ(chosen_of({copying}), std::nullopt);
 }
 
 TEST(VulkanMatch, LeavesNoObjectBehind) {
@@ -417,7 +430,7 @@ TEST_F(VulkanFailures, TheDeviceMayBeLostAtAnySubmission) {
 TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   FaultyLoader::faults() = {.no_formats = true};
   EXPECT_THAT(message_of_match(), HasSubstr("lacks storage images"));
-  FaultyLoader::faults() = {.no_compute_queues = true};
+  FaultyLoader::faults() = {.queue_families = {queue_family(VK_QUEUE_TRANSFER_BIT)}};
   EXPECT_THAT(message_of_match(), HasSubstr("no compute queue"));
   FaultyLoader::faults() = {.old_device = true};
   EXPECT_THAT(message_of_match(), HasSubstr("offers Vulkan 1.0.0"));
