@@ -89,15 +89,6 @@ std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& 
   return hypotheses;
 }
 
-/// Empty where exact filtering gives the same bits as on the CPU.
-std::string why_bits_may_differ(const Device& device) {
-  const DeviceInfo& info = device.info();
-  if (info.kind != DeviceKind::vulkan || info.driver.find("Mesa 22.3") != std::string::npos) {
-    return "";
-  }
-  return "Vulkan drivers may contract and reorder; Mesa 22.3's lavapipe does not.";
-}
-
 void expect_same_bits(const ViewResult& expected, const ViewResult& actual) {
   EXPECT_EQ(cv::norm(expected.hypotheses, actual.hypotheses, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(expected.confidence, actual.confidence, cv::NORM_INF), 0);
