@@ -71,7 +71,7 @@ VKAPI_ATTR VkResult VKAPI_CALL cache_data(VkDevice device, VkPipelineCache cache
 
 VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceProperties* out) {
   real_properties(device, out);
-  if (faults().is_gpu) out->deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+  out->deviceType = faults().type.value_or(out->deviceType);
   if (faults().old_device) out->apiVersion = VK_API_VERSION_1_0;
   if (faults().largest_push_constants > 0) {
     out->limits.maxPushConstantsSize = faults().largest_push_constants;

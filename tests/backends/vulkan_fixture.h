@@ -8,6 +8,7 @@
 #include <cstring>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -106,8 +107,8 @@ struct Faults {
   int failing_wait = -1;        ///< the n-th vkWaitForFences loses the device
   bool no_layers = false;
   bool no_formats = false;
-  bool no_filtering = false;  ///< images of no format can be filtered
-  bool is_gpu = false;        ///< says that it is a discrete GPU
+  bool no_filtering = false;                      ///< images of no format can be filtered
+  std::optional<VkPhysicalDeviceType> type = {};  ///< what the device says it is
   /// Instead of the device's own, if any.
   std::vector<VkQueueFamilyProperties> queue_families = {};
   bool old_device = false;  ///< Vulkan 1.0
