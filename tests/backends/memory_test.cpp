@@ -12,14 +12,55 @@
 namespace widestereo::test {
 namespace {
 
-constexpr double bytes_of_pixel = 16 + 16 + 16 + 16;  // ray, plane, checks, prior
-constexpr double bytes_of_intensity = 4;              // of the image and 16 pixels around it,
-                                                      // or a half pixel and 32 around them
+constexpr double maps = 4;                // ray, plane, checks, prior
+constexpr double bytes_of_map = 16;       // at each pixel
+constexpr double bytes_of_intensity = 4;  // of the image and 16 pixels around it,
+                                          // or a half pixel and 32 around them
 constexpr double bytes_of_transfer = 4 + 4;
 constexpr double side = 128;
+constexpr double bytes_of_largest_tile = 65536;
 
-/// Of a square image whose rows are whole lines of this many texels.
-double texels_of(double wide, double line) { return wide * line * std::ceil(wide / line); }
+double rounded_up(double texels, double multiple) {
+  return multiple * std::ceil(texels / multiple);
+}
+
+/// Of an image in square tiles of so many bytes, which it takes whole; of single texels where 0.
+double bytes_of_image(double wide, double high, double bytes_of_texel, double bytes_of_tile) {
+  const double tile = bytes_of_tile > 0 ? std::sqrt(bytes_of_tile / bytes_of_texel) : 1;
+  return rounded_up(wide, tile) * rounded_up(high, tile) * bytes_of_texel;
+}
+
+/// What docs/performance.md states for two views of `side`.
+double documented_bytes(const DeviceInfo& device, int levels, double bytes_of_tile) {
+  // Rows of CUDA are whole lines of 128 bytes.
+  const double line = device.kind == DeviceKind::cuda ? 128 / bytes_of_intensity : 1;
+  const auto bytes_of_rows = [&](double wide) {
+    return wide * rounded_up(wide, line) * bytes_of_intensity;
+  };
+  // Vulkan stages transfers of one map in a buffer.
+  const bool levels_share_layers = device.kind == DeviceKind::vulkan;
+  double bytes = side * side * (bytes_of_transfer + (levels_share_layers ? 16 : 0));
+  // Software Vulkan keeps each half pixel with its right, lower and lower right neighbour.
+  const bool loads = levels_share_layers && device.type == "cpu";
+  for (int level = 0; level < levels; ++level) {
+    const double own = side / (1 << level);
+    const double half_pixels = 2 * own + 2 * 32;
+    if (levels_share_layers) {
+      bytes += 2 * bytes_of_image(half_pixels, half_pixels, (loads ? 4 : 1) * bytes_of_intensity,
+                                  bytes_of_tile);
+    } else {
+      bytes += 2 * (bytes_of_rows(half_pixels) + bytes_of_rows(own + 2 * 16));
+      bytes += 2 * own * own * maps * bytes_of_map;
+    }
+  }
+  if (levels_share_layers) {
+    const double layers = levels == 1 ? 2 : 3;                         // one for all that is coarse
+    const double width = levels == 1 ? side + 2 * 16 : side + 4 * 16;  // two half as wide
+    bytes += layers * maps * bytes_of_image(side, side, bytes_of_map, bytes_of_tile);
+    bytes += layers * bytes_of_image(width, side + 2 * 16, bytes_of_intensity, bytes_of_tile);
+  }
+  return bytes;
+}
 
 class Memory : public ::testing::TestWithParam<const char*> {};
 
@@ -37,30 +78,14 @@ double bytes_on(Device& device, const std::string& preset) {
 
 TEST_P(Memory, IsWhatIsDocumented) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
-  const double line = device->info().kind == DeviceKind::cuda ? 128 / bytes_of_intensity : 1;
-  const bool levels_share_layers = device->info().kind == DeviceKind::vulkan;
-  // Software Vulkan keeps each half pixel with its right, lower and lower right neighbour.
-  const bool loads = levels_share_layers && device->info().type == "cpu";
-  const double bytes_of_half_pixel = (loads ? 4 : 1) * bytes_of_intensity;
+  const DeviceInfo& info = device->info();
+  const bool has_tiles = info.kind == DeviceKind::vulkan && info.type != "cpu";
   for (const auto& [preset, levels] : {std::pair("paper", 1), std::pair("fast", 3)}) {
-    // Vulkan stages transfers of one map in a buffer.
-    double expected = side * side * (bytes_of_transfer + (levels_share_layers ? 16 : 0));
-    for (int level = 0; level < levels; ++level) {
-      const double own = side / (1 << level);
-      const double intensities = levels_share_layers ? 0 : texels_of(own + 2 * 16, line);
-      expected += 2 * intensities * bytes_of_intensity;
-      expected += 2 * texels_of(2 * own + 2 * 32, line) * bytes_of_half_pixel;
-      if (!levels_share_layers) expected += 2 * own * own * bytes_of_pixel;
-    }
-    if (levels_share_layers) {
-      const double layers = levels == 1 ? 2 : 3;  // one for all that is coarse
-      const double width = levels == 1 ? side + 2 * 16 : side + 4 * 16;  // two half as wide
-      expected +=
-          layers * (side * side * bytes_of_pixel + width * (side + 2 * 16) * bytes_of_intensity);
-    }
     const double bytes = bytes_on(*device, preset);
-    EXPECT_GE(bytes, expected) << preset;
-    EXPECT_LE(bytes, 1.01 * expected + 3 * 16384) << preset;  // rounding, and parameters
+    EXPECT_GE(bytes, documented_bytes(info, levels, 0)) << preset;
+    // Drivers choose smaller tiles where they waste less; the rest is rounding, and parameters.
+    const double most = documented_bytes(info, levels, has_tiles ? bytes_of_largest_tile : 0);
+    EXPECT_LE(bytes, 1.01 * most + 3 * 16384) << preset;
   }
 }
 
