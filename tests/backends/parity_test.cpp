@@ -162,12 +162,15 @@ TEST_P(Parity, PyramidMatchAgrees) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   Device cpu = Device::open("cpu");
   const RenderedPair pair = render_demo(129);  // odd: levels with partial last pixels
+  // Rounding is amplified at depth edges, of which so small an image has many: on the CPU alone,
+  // intensities that differ by 1e-6 move an eighth of the pixels by more than 0.005.
+  const double of_exact = why_bits_may_differ(*device).empty() ? 0.005 : 0.03;
+  const double of_rounded_positions = 0.05;
   for (const auto& [preset, filter, tolerance] :
-       {std::tuple("fast", Filter::exact, 0.005),
-        {"quality", Filter::exact, 0.005},
-        // Rounded positions, amplified at depth edges, of which so small an image has many.
-        {"fast", Filter::device, 0.05},
-        {"quality", Filter::device, 0.05}}) {
+       {std::tuple("fast", Filter::exact, of_exact),
+        {"quality", Filter::exact, of_exact},
+        {"fast", Filter::device, of_rounded_positions},
+        {"quality", Filter::device, of_rounded_positions}}) {
     SCOPED_TRACE(testing::Message() << preset << static_cast<int>(filter));
     Options options = Options::preset_named(preset);
     options.filter = filter;
@@ -178,6 +181,12 @@ TEST_P(Parity, PyramidMatchAgrees) {
     const StereoResult actual = Matcher(*device, pair.rig, options).match(images_of(pair));
     for (int view = 0; view < 2; ++view) {
       expect_agreement(expected.views[view], actual.views[view], tolerance);
+      const auto median_error = [&](const StereoResult& result) {
+        return evaluate(result.views[view].distance, {}, pair.views[view].truth,
+                        pair.rig.views[view], pair.rig.views[1 - view])[1]
+            .median_relative;
+      };
+      EXPECT_NEAR(median_error(actual), median_error(expected), 0.1 * median_error(expected));
     }
   }
   expect_no_validation_messages(*device);
