@@ -25,35 +25,45 @@
 // Share of planes that are wrong where intensity does not curve at all.
 #define WRONG_WITHOUT_CURVATURE 0.4f
 
-// Variance of the reference patch over its usable pixels (x), and of the noise in it (y), for which second differences
-// along its rows are taken.
-FN vec2 reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
+// Variance of the reference patch over its usable pixels.
+FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   float centre = intensity_at(CONTEXT REFERENCE, pixel);
   float n = 0.0f;
   float sum = 0.0f;
   float sum_squares = 0.0f;
-  float differences = 0.0f;
-  float sum_curvature = 0.0f;
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-    float last = MASKED_INTENSITY;
-    float last_but_one = MASKED_INTENSITY;
-    for (int dx = -WINDOW_RADIUS; dx <= WINDOW_RADIUS; ++dx) {
-      float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
-      if (min(a, min(last, last_but_one)) >= 0.0f) {
-        float curvature = (a - last) - (last - last_but_one);
-        differences += 1.0f;
-        sum_curvature += curvature * curvature;
-      }
-      last_but_one = last;
-      last = a;
-      if (a < 0.0f) continue;
-      a -= centre;
-      n += 1.0f;
+    IntensityRow row = intensity_row(CONTEXT REFERENCE, ivec2(pixel.x - WINDOW_RADIUS, pixel.y + dy));
+    for (int dx = 0; dx <= 2 * WINDOW_RADIUS; ++dx) {
+      float a = intensity_in_row(row, dx);
+      bool usable = a >= 0.0f;
+      a = usable ? a - centre : 0.0f;
+      n += usable ? 1.0f : 0.0f;
       sum += a;
       sum_squares += a * a;
     }
   }
-  return vec2((sum_squares - sum * sum / n) / n, sum_curvature / (6.0f * max(differences, 1.0f)));
+  return (sum_squares - sum * sum / n) / n;
+}
+
+// Variance of the noise in the reference patch, for which second differences along its rows are taken.
+FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
+  float differences = 0.0f;
+  float sum_curvature = 0.0f;
+  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    IntensityRow row = intensity_row(CONTEXT REFERENCE, ivec2(pixel.x - WINDOW_RADIUS, pixel.y + dy));
+    float last = MASKED_INTENSITY;
+    float last_but_one = MASKED_INTENSITY;
+    for (int dx = 0; dx <= 2 * WINDOW_RADIUS; ++dx) {
+      float a = intensity_in_row(row, dx);
+      float curvature = (a - last) - (last - last_but_one);
+      bool usable = min(a, min(last, last_but_one)) >= 0.0f;
+      differences += usable ? 1.0f : 0.0f;
+      sum_curvature += usable ? curvature * curvature : 0.0f;
+      last_but_one = last;
+      last = a;
+    }
+  }
+  return sum_curvature / (6.0f * max(differences, 1.0f));
 }
 
 // How far intensity curves around the pixel by more than noise does, 0 to 1: where it is constant or a gradient, patches
@@ -109,17 +119,21 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   float planes = 0.0f;
   float supporting = 0.0f;
   float evidence = 0.0f;
-  for (int dy = -SUPPORT_RADIUS; dy <= SUPPORT_RADIUS; dy += SUPPORT_STEP) {
-    for (int dx = -SUPPORT_RADIUS; dx <= SUPPORT_RADIUS; dx += SUPPORT_STEP) {
-      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      if ((dx == 0 && dy == 0) || !in_image(PARAMETERS.cameras[REFERENCE].size, q)) continue;
-      vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
-      if (plane.w >= INVALID_COST) continue;
-      planes += 1.0f;
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  int first_x = first_in_image(pixel.x, -SUPPORT_RADIUS, SUPPORT_STEP);
+  int first_y = first_in_image(pixel.y, -SUPPORT_RADIUS, SUPPORT_STEP);
+  int last_x = min(SUPPORT_RADIUS, size.x - 1 - pixel.x);
+  int last_y = min(SUPPORT_RADIUS, size.y - 1 - pixel.y);
+  for (int dy = first_y; dy <= last_y; dy += SUPPORT_STEP) {
+    for (int dx = first_x; dx <= last_x; dx += SUPPORT_STEP) {
+      vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
+      // No branches, so that planes are loaded ahead.
+      float counts = plane.w < INVALID_COST && (dx != 0 || dy != 0) ? 1.0f : 0.0f;
+      planes += counts;
       float correlation = max(1.0f - plane.w, 0.0f);
-      evidence += correlation * correlation;
+      evidence += counts * (correlation * correlation);
       float difference = inverse_distance_of(plane, ray) - w;
-      if (abs(difference) * speed < SUPPORT_DISPLACEMENT) supporting += 1.0f;
+      supporting += abs(difference) * speed < SUPPORT_DISPLACEMENT ? counts : 0.0f;
     }
   }
   float share = 1.0f / max(planes, 1.0f);
@@ -169,10 +183,10 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       if (candidate.y < difference.y) difference = candidate;
     }
     vec4 limits = PARAMETERS.check_limits;
-    vec2 variance = reference_variance(CONTEXT pixel);
+    float variance = reference_variance(CONTEXT pixel);
     vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
     bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
-    if (variance.x < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
+    if (variance < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
     if (held.w > limits.z) reasons |= REASON_HIGH_COST;
     if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) reasons |= REASON_LOW_PARALLAX;
     if (w < PARAMETERS.patch_limits.z * length(m)) reasons |= REASON_TILT;
@@ -189,8 +203,8 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       confidence = intensity_in_source(CONTEXT source, ray, w);
     } else {
       confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
-                                 variance.x * min(held.w, 1.0f), support.y,
-                                 structure_of_surroundings(CONTEXT pixel, variance.y));
+                                 variance * min(held.w, 1.0f), support.y,
+                                 structure_of_surroundings(CONTEXT pixel, reference_noise(CONTEXT pixel)));
     }
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));

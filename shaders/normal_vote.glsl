@@ -21,6 +21,7 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     ivec4 size = PARAMETERS.cameras[REFERENCE].size;
     float own = inverse_distance_of(held, ray);
     float scale = measure.y / VOTE_DISPLACEMENT;
+    float own_place = scale * own;
     vec3 candidates[NORMAL_CANDIDATES];
     float support[NORMAL_CANDIDATES];
     UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
@@ -34,14 +35,17 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     float fall_off = 2.0f / float(NORMAL_VOTE_RADIUS * NORMAL_VOTE_RADIUS);
     float inverse_scale = PARAMETERS.support.y;
-    for (int dy = -NORMAL_VOTE_RADIUS; dy <= NORMAL_VOTE_RADIUS; dy += NORMAL_VOTE_STEP) {
-      for (int dx = -NORMAL_VOTE_RADIUS; dx <= NORMAL_VOTE_RADIUS; dx += NORMAL_VOTE_STEP) {
+    int first_x = first_in_image(pixel.x, -NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP);
+    int first_y = first_in_image(pixel.y, -NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP);
+    int last_x = min(NORMAL_VOTE_RADIUS, size.x - 1 - pixel.x);
+    int last_y = min(NORMAL_VOTE_RADIUS, size.y - 1 - pixel.y);
+    for (int dy = first_y; dy <= last_y; dy += NORMAL_VOTE_STEP) {
+      for (int dx = first_x; dx <= last_x; dx += NORMAL_VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-        if (!in_image(size, q)) continue;
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         if (plane.w >= INVALID_COST) continue;
         vec3 m = vec3(plane.x, plane.y, plane.z);
-        float weight = support_between(dot(m, ray), own, scale) /
+        float weight = support_between(scale * dot(m, ray), own_place) /
                        remoteness_of_voter(CONTEXT q, dx, dy, fall_off, measure.w, inverse_scale);
         vec3 normal = (1.0f / length(m)) * m;
         UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {

@@ -8,6 +8,12 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
+// The first offset from x on a grid of this step that begins with `first` which lies in an image, whose first pixel is 0.
+FN int first_in_image(int x, int first, int step) {
+  while (x + first < 0) first += step;
+  return first;
+}
+
 FN ivec2 nearest_in_image(ivec4 size, ivec2 pixel) {
   return ivec2(clamp(pixel.x, 0, size.x - 1), clamp(pixel.y, 0, size.y - 1));
 }
@@ -316,6 +322,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
 
 // Mean over the best sources that see the patch; INVALID_COST when none does.
 FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
+  if (SOURCE_COUNT == 1) return source_cost(CONTEXT source_at(CONTEXT 0), pixel, m);
   float best[MAX_IMAGES];
   int count = 0;
   for (int i = 0; i < SOURCE_COUNT; ++i) {

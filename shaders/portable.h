@@ -63,6 +63,12 @@
 #define uint_as_float(a) uintBitsToFloat(a)
 #define float_as_uint(a) floatBitsToUint(a)
 #define lowest_bit(a) findLSB(a)
+// Software would compute both limits.
+#ifdef TEXEL_LOADS
+#define saturate_below_one(a) max(a, 0.0f)
+#else
+#define saturate_below_one(a) clamp(a, 0.0f, 1.0f)
+#endif
 
 #include "elementary.glsl"
 

@@ -75,6 +75,14 @@ FN T max(T a, T b) { return a < b ? b : a; }
 FN float min(float a, float b) { return ::fminf(a, b); }
 FN float max(float a, float b) { return ::fmaxf(a, b); }
 #endif
+// At least 0, of an `a` of 1 at most: costs a GPU nothing.
+FN float saturate_below_one(float a) {
+#ifdef __CUDA_ARCH__
+  return __saturatef(a);
+#else
+  return max(a, 0.0f);
+#endif
+}
 template <class T>
 FN T clamp(T a, T low, T high) { return min(max(a, low), high); }
 template <class T>

@@ -32,10 +32,10 @@ FN ivec2 vote_candidate_at(CONTEXT_ARGUMENT ivec2 pixel, int i) {
   return ivec2(pixel.x + (k % 3 - 1) * reach, pixel.y + (k / 3 - 1) * reach);
 }
 
-// How much one plane supports another, from their inverse distances at the pixel. `scale`: of a displacement.
-FN float support_between(float w, float candidate, float scale) {
-  float difference = (w - candidate) * scale;
-  float agreement = max(1.0f - difference * difference, 0.0f);
+// How much one plane supports another, from where they put the pixel's point, in units of VOTE_DISPLACEMENT.
+FN float support_between(float place, float candidate) {
+  float difference = place - candidate;
+  float agreement = saturate_below_one(1.0f - difference * difference);
   return agreement * agreement;
 }
 
@@ -117,18 +117,20 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec2 velocity;
     int source = telling_source(CONTEXT ray, own, velocity);
     float speed = length(velocity);
+    // Places along the epipolar curve, in units of VOTE_DISPLACEMENT.
     float scale = speed / VOTE_DISPLACEMENT;
+    float own_place = scale * own;
     float candidates[VOTE_CANDIDATES];
     float support[VOTE_CANDIDATES];
     UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
       ivec2 q = vote_candidate_at(CONTEXT pixel, i);
-      candidates[i] = own;
+      candidates[i] = own_place;
       support[i] = 0.0f;
       if (!in_image(size, q)) continue;
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
       vec3 m = vec3(plane.x, plane.y, plane.z);
       bool differs = abs(dot(m, ray) - own) * speed > SAME_DISPLACEMENT;
-      if (differs && plane.w < INVALID_COST && admissible(CONTEXT ray, m)) candidates[i] = dot(m, ray);
+      if (differs && plane.w < INVALID_COST && admissible(CONTEXT ray, m)) candidates[i] = scale * dot(m, ray);
     }
     float intensity = intensity_at(CONTEXT REFERENCE, pixel);
     float fall_off = 1.0f / float(PASS.radius * PASS.radius);
@@ -136,19 +138,20 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float most = 0.0f;
     // Every tile asks others, so that its neighbours do not make the same mistake.
     vec4 u = draw4_of_tile(CONTEXT pixel, VOTE_SLOT);
-    int first_x = int(u.x * float(VOTE_STEP)) - PASS.radius;
-    int first_y = int(u.y * float(VOTE_STEP)) - PASS.radius;
-    for (int dy = first_y; dy <= PASS.radius; dy += VOTE_STEP) {
-      for (int dx = first_x; dx <= PASS.radius; dx += VOTE_STEP) {
+    int first_x = first_in_image(pixel.x, int(u.x * float(VOTE_STEP)) - PASS.radius, VOTE_STEP);
+    int first_y = first_in_image(pixel.y, int(u.y * float(VOTE_STEP)) - PASS.radius, VOTE_STEP);
+    int last_x = min(PASS.radius, size.x - 1 - pixel.x);
+    int last_y = min(PASS.radius, size.y - 1 - pixel.y);
+    for (int dy = first_y; dy <= last_y; dy += VOTE_STEP) {
+      for (int dx = first_x; dx <= last_x; dx += VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-        if (!in_image(size, q)) continue;
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
-        if (plane.w >= INVALID_COST) continue;
-        float w = inverse_distance_of(plane, ray);
+        float place = scale * inverse_distance_of(plane, ray);
         float weight = 1.0f / remoteness_of_voter(CONTEXT q, dx, dy, fall_off, intensity, inverse_scale);
-        most += weight * support_between(w, own, scale);
+        weight = plane.w < INVALID_COST ? weight : 0.0f;
+        most += weight * support_between(place, own_place);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
-          support[i] += weight * support_between(w, candidates[i], scale);
+          support[i] += weight * support_between(place, candidates[i]);
         }
       }
     }
@@ -161,20 +164,20 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int count = 1;
     UNROLL for (int rival = 1; rival <= VOTE_RIVALS; ++rival) {
       int chosen = -1;
-      float w = own;
+      float place = own_place;
       votes[rival] = 0.0f;
       UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
-        if (candidates[i] != own && support[i] > votes[rival]) {
+        if (candidates[i] != own_place && support[i] > votes[rival]) {
           votes[rival] = support[i];
           chosen = i;
-          w = candidates[i];
+          place = candidates[i];
         }
       }
       if (chosen < 0) break;
       standing[rival] = vote_candidate_at(CONTEXT pixel, chosen);
       ++count;
       UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
-        if (abs(candidates[i] - w) * speed < RIVAL_DISPLACEMENT) support[i] = 0.0f;
+        if (abs(candidates[i] - place) * VOTE_DISPLACEMENT < RIVAL_DISPLACEMENT) support[i] = 0.0f;
       }
     }
     // Where nothing competes, as on most surfaces, nothing needs to be sampled.
