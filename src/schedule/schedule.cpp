@@ -207,19 +207,14 @@ class Builder {
         search(level, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
-        // Where a launch of one view fills a GPU, views are measured against the ones before that
-        // are regressed already: they agree better.
-        for (const Views views : launches(level, level > 0 ? at_once : one_by_one)) {
-          measure(views);
-          if (i == 0 && options_.subpixel_match) match_subpixel(views);
-          const bool last = i + 1 == options_.level_regressions[place];
-          // Costs are not needed before the last round, those of before lie near enough.
-          const Kernel adopt = level == 0 ? until_vote()
-                               : last     ? Kernel::adopt
-                                          : Kernel::adopt_point;
-          regress(views, level == 0 ? round(i) : coarse_round(i),
-                  level > 0 && i > 0 ? HELD_UNSEEN : 0, adopt);
-        }
+        const Views views = views_of(level);
+        measure(views);
+        if (i == 0 && options_.subpixel_match) match_subpixel(views);
+        const bool last = i + 1 == options_.level_regressions[place];
+        // Costs are not needed before the last round, those of before lie near enough.
+        const Kernel adopt = level == 0 ? until_vote() : last ? Kernel::adopt : Kernel::adopt_point;
+        regress(views, level == 0 ? round(i) : coarse_round(i),
+                level > 0 && i > 0 ? HELD_UNSEEN : 0, adopt);
         if (level > 0) continue;
         repair_and_vote();
       }
