@@ -19,6 +19,10 @@ std::size_t area(cv::Size size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }
 
+int half_pixel_bytes(const KernelConstants& constants) {
+  return kernel::cuda::half_pixel_bytes(constants.filter == static_cast<int>(Filter::device));
+}
+
 /// Parameters may differ: launches read them from device memory.
 bool same_launches(const Schedule& a, const Schedule& b) {
   return a.constants == b.constants &&
@@ -117,17 +121,19 @@ void CudaBackend::make_maps() {
     const cudaStream_t stream = stream_.get();
     ViewMaps& maps = maps_.emplace_back();
     maps.rays = DeviceArray<float4>(pixels, stream, name, "the viewing rays");
-    maps.intensities = DeviceImage(with_apron(size), APRON, stream, name);
-    maps.half_pixels = DeviceImage(size_of_half_pixels(size), HALF_PIXEL_APRON, stream, name);
+    maps.intensities = DeviceImage(with_apron(size), APRON, sizeof(float), stream, name);
+    maps.half_pixels = DeviceImage(size_of_half_pixels(size), HALF_PIXEL_APRON,
+                                   half_pixel_bytes(constants_), stream, name);
     maps.texture = maps.half_pixels.make_texture(name);
     maps.hypotheses = DeviceArray<float4>(pixels, stream, name, "the planes");
     maps.checks = DeviceArray<float4>(pixels, stream, name, "the consistency maps");
     maps.priors = DeviceArray<float4>(pixels, stream, name, "the planes' priors");
-    context_.views[maps_.size() - 1] = {maps.rays.get(),           maps.intensities.get(),
-                                        maps.half_pixels.get(),    maps.texture.get(),
-                                        maps.hypotheses.get(),     maps.checks.get(),
-                                        maps.priors.get(),         size.width,
-                                        maps.intensities.stride(), maps.half_pixels.stride()};
+    context_.views[maps_.size() - 1] = {
+        maps.rays.get(),           static_cast<float*>(maps.intensities.get()),
+        maps.half_pixels.get(),    maps.texture.get(),
+        maps.hypotheses.get(),     maps.checks.get(),
+        maps.priors.get(),         size.width,
+        maps.intensities.stride(), maps.half_pixels.stride()};
     largest = std::max(largest, pixels);
   }
   transfer_nearest_ =

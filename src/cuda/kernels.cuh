@@ -3,6 +3,7 @@
 // each kernel of the schedule. No algorithm here.
 #pragma once
 
+#include <cuda_fp16.h>
 #include <cuda_runtime.h>
 
 #include <string_view>
@@ -14,7 +15,7 @@ namespace widestereo::kernel::cuda {
 
 /// Constants known at compile time; -1 = read from the context. Without a model each source's own
 /// is used.
-template <int Radius, int Warp, int Pattern, int Weighted, int Filter, int Model>
+template <int Radius, int Warp, int Pattern, int Weighted, int Filter, int Model, int Sources>
 struct Constants {
   static constexpr int window_radius = Radius;
   static constexpr int warp = Warp;
@@ -22,11 +23,12 @@ struct Constants {
   static constexpr int weighted = Weighted;
   static constexpr int filter = Filter;
   static constexpr int camera_model = Model;
+  static constexpr int source_count = Sources;
   /// On the checkerboard rows start in turn one column later: two are the same for all turns.
   static constexpr int unrolled_rows =
       Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
 };
-using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
+using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1>;
 
 #define WINDOW_RADIUS (C::window_radius >= 0 ? C::window_radius : context.window_radius)
 #define WARP (C::warp >= 0 ? C::warp : context.warp)
@@ -34,7 +36,7 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1>;
 #define WEIGHTED (C::weighted >= 0 ? C::weighted : context.weighted)
 #define FILTER (C::filter >= 0 ? C::filter : context.filter)
 #define CAMERA_MODEL (C::camera_model >= 0 ? C::camera_model : context.camera_model)
-#define SOURCE_COUNT context.source_count
+#define SOURCE_COUNT (C::source_count >= 0 ? C::source_count : context.source_count)
 #define VIEW_OF_LAUNCH static_cast<int>(blockIdx.z)
 #define HAS_DEVICE_FILTER
 #undef PARAMETERS
@@ -70,19 +72,32 @@ struct Algorithm {
     return intensity_address(CONTEXT view, p);
   }
   FN float intensity_in_row(IntensityRow row, int dx) { return __ldg(row + dx); }
-  FN float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
-    return context.views[view].half_pixels + (p.y * context.views[view].half_pixel_stride + p.x);
+  template <class Texel>
+  FN Texel* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return static_cast<Texel*>(context.views[view].half_pixels) +
+           (p.y * context.views[view].half_pixel_stride + p.x);
+  }
+  template <class Texel>
+  FN vec4 taps_of(CONTEXT_ARGUMENT int view, ivec2 p) {
+    const Texel* top = half_pixel_address<Texel>(CONTEXT view, p);
+    const Texel* bottom = top + context.views[view].half_pixel_stride;
+    return vec4(float(__ldg(top)), float(__ldg(top + 1)), float(__ldg(bottom)),
+                float(__ldg(bottom + 1)));
   }
   FN vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
-    const float* top = half_pixel_address(CONTEXT view, p);
-    const float* bottom = top + context.views[view].half_pixel_stride;
-    return vec4(__ldg(top), __ldg(top + 1), __ldg(bottom), __ldg(bottom + 1));
+    if (FILTER == FILTER_DEVICE) return taps_of<__half>(CONTEXT view, p);
+    return taps_of<float>(CONTEXT view, p);
   }
   FN float filtered_half_pixel(CONTEXT_ARGUMENT int view, vec2 texel) {
     return tex2D<float>(context.views[view].texture, texel.x, texel.y);
   }
   FN void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
-    *half_pixel_address(CONTEXT view, p) = taps.x;
+    if (FILTER == FILTER_DEVICE) {
+      const float representable = max(taps.x, lowest_half);
+      *half_pixel_address<__half>(CONTEXT view, p) = __float2half_rn(representable);
+    } else {
+      *half_pixel_address<float>(CONTEXT view, p) = taps.x;
+    }
   }
   FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
     *intensity_address(CONTEXT view, p) = intensity;
@@ -140,7 +155,7 @@ struct Algorithm {
 template <class C>
 constexpr int least_blocks(std::string_view kernel) {
   if (C::camera_model < 0) return 4;
-  return kernel == "vote" ? 4 : 5;  // the planes that stand take registers
+  return kernel == "vote" ? 6 : 5;  // more warps hide what it loads
 }
 
 #define KERNEL(name, view)                                                             \
@@ -163,17 +178,19 @@ KernelTable table_of(const KernelEntry (&entries)[count]) {
   return {entries, count};
 }
 
-/// Calls `get`, a callable over a Constants tag, with those of a camera model.
+/// Calls `get`, a callable over a Constants tag, with those of a camera model and a number of
+/// sources. Pairs have instances of their own for each model, more views one for all.
 template <int Radius, int Warp, int Pattern, int Weighted, class Get>
-KernelTable for_model(int camera_model, Get get) {
+KernelTable for_rig(int camera_model, int source_count, Get get) {
   constexpr int Filter = FILTER_DEVICE;
+  if (source_count != 1) return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1, -1>());
   switch (camera_model) {
     case CAMERA_KANNALA_BRANDT:
-      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_KANNALA_BRANDT>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_KANNALA_BRANDT, 1>());
     case CAMERA_DOUBLE_SPHERE:
-      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_DOUBLE_SPHERE>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_DOUBLE_SPHERE, 1>());
     default:
-      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1, 1>());
   }
 }
 

@@ -17,7 +17,7 @@ constexpr int block_height = 8;
 struct ViewMemory {
   const float4* rays;
   float* intensities;           ///< of pixel (0, 0); APRON masked ones surround the image
-  float* half_pixels;           ///< likewise; HALF_PIXEL_APRON masked ones surround them
+  void* half_pixels;            ///< likewise; HALF_PIXEL_APRON masked ones surround them
   cudaTextureObject_t texture;  ///< over the half pixels, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
   float4* checks;
@@ -26,6 +26,13 @@ struct ViewMemory {
   int stride;             ///< of the intensities: pixels from row to row
   int half_pixel_stride;  ///< likewise
 };
+
+/// Half pixels that texture units filter have half precision: texels of fewer bytes collide less in
+/// the texture cache, which bounds the search. Those that are filtered exactly are floats.
+constexpr int half_pixel_bytes(bool filtered_by_device) { return filtered_by_device ? 2 : 4; }
+/// The lowest number of half precision stands for MASKED_INTENSITY there.
+constexpr float lowest_half = -65504.0f;
+constexpr unsigned short lowest_half_bits = 0xfbff;
 
 /// What a kernel sees besides its pixel: the one argument of every kernel.
 struct Context {
@@ -60,9 +67,9 @@ KernelTable generic_kernels();
 /// window and the constants of a preset: `paper` (exact warp, dense), the same with the affine
 /// warp, or `fast` and `quality` (affine, checkerboard, weighted).
 /// `camera_model`: a camera model that has kernels of its own (kannala_brandt, double_sphere),
-/// anything else selects those for all models.
-KernelTable paper_kernels(int camera_model);
-KernelTable affine_paper_kernels(int camera_model);
-KernelTable pyramid_kernels(int camera_model);
+/// anything else selects those for all models. With one source, they are compiled for that, too.
+KernelTable paper_kernels(int camera_model, int source_count);
+KernelTable affine_paper_kernels(int camera_model, int source_count);
+KernelTable pyramid_kernels(int camera_model, int source_count);
 
 }  // namespace widestereo::kernel::cuda

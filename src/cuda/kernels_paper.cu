@@ -14,11 +14,13 @@ struct Get {
 
 }  // namespace
 
-KernelTable paper_kernels(int camera_model) {
-  return for_model<paper_window_radius, WARP_EXACT, PATTERN_DENSE, 0>(camera_model, Get());
+KernelTable paper_kernels(int camera_model, int source_count) {
+  return for_rig<paper_window_radius, WARP_EXACT, PATTERN_DENSE, 0>(camera_model, source_count,
+                                                                    Get());
 }
-KernelTable affine_paper_kernels(int camera_model) {
-  return for_model<paper_window_radius, WARP_AFFINE, PATTERN_DENSE, 0>(camera_model, Get());
+KernelTable affine_paper_kernels(int camera_model, int source_count) {
+  return for_rig<paper_window_radius, WARP_AFFINE, PATTERN_DENSE, 0>(camera_model, source_count,
+                                                                     Get());
 }
 
 }  // namespace widestereo::kernel::cuda

@@ -2,9 +2,9 @@
 #include "cuda/kernels.cuh"
 
 namespace widestereo::kernel::cuda {
-KernelTable pyramid_kernels(int camera_model) {
-  return for_model<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 1>(camera_model,
-                                                                                PyramidKernels());
+KernelTable pyramid_kernels(int camera_model, int source_count) {
+  return for_rig<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 1>(
+      camera_model, source_count, PyramidKernels());
 }
 
 }  // namespace widestereo::kernel::cuda

@@ -24,11 +24,11 @@ KernelTable specialised_kernels(const KernelConstants& c) {
            (c.weighted != 0) == weighted;
   };
   if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense, false))
-    return paper_kernels(c.camera_model);
+    return paper_kernels(c.camera_model, c.source_count);
   if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, false))
-    return affine_paper_kernels(c.camera_model);
+    return affine_paper_kernels(c.camera_model, c.source_count);
   if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
-    return pyramid_kernels(c.camera_model);
+    return pyramid_kernels(c.camera_model, c.source_count);
   return {nullptr, 0};
 }
 

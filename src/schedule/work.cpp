@@ -91,8 +91,10 @@ enum Map : unsigned {
   half_pixels = 1024,
 };
 
-int bytes_of(unsigned maps) {
-  constexpr std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, 16};
+int bytes_of(unsigned maps, int filter) {
+  // Texture units may have half pixels of half precision.
+  const int four_half_pixels = filter == static_cast<int>(Filter::exact) ? 16 : 8;
+  const std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, four_half_pixels};
   int sum = 0;
   for (unsigned i = 0; i < bytes.size(); ++i) {
     if ((maps >> i & 1) != 0) sum += bytes[i];
@@ -215,12 +217,13 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const auto pixels = static_cast<double>(dispatch.pixels);
   const Traffic traffic = traffic_of(dispatch);
   const int sources = schedule.constants.source_count;
+  const auto bytes = [&](unsigned maps) { return bytes_of(maps, schedule.constants.filter); };
   return {.samples = samples,
           .operations = samples * operations.of_sample + patches * operations.of_patch +
                         pixels * regression_operations(dispatch),
           .texels = 4 * samples,
-          .bytes = pixels * (bytes_of(traffic.read) + bytes_of(traffic.written) +
-                             sources * bytes_of(traffic.read_in_sources))};
+          .bytes = pixels * (bytes(traffic.read) + bytes(traffic.written) +
+                             sources * bytes(traffic.read_in_sources))};
 }
 
 }  // namespace widestereo

@@ -33,9 +33,9 @@ double bytes_of_image(double wide, double high, double bytes_of_texel, double by
 /// What docs/performance.md states for two views of `side`.
 double documented_bytes(const DeviceInfo& device, int levels, double bytes_of_tile) {
   // Rows of CUDA are whole lines of 128 bytes.
-  const double line = device.kind == DeviceKind::cuda ? 128 / bytes_of_intensity : 1;
-  const auto bytes_of_rows = [&](double wide) {
-    return wide * rounded_up(wide, line) * bytes_of_intensity;
+  const bool cuda = device.kind == DeviceKind::cuda;
+  const auto bytes_of_rows = [&](double wide, double texel) {
+    return wide * rounded_up(wide * texel, cuda ? 128 : 1);
   };
   // Vulkan stages transfers of one map in a buffer.
   const bool levels_share_layers = device.kind == DeviceKind::vulkan;
@@ -49,7 +49,10 @@ double documented_bytes(const DeviceInfo& device, int levels, double bytes_of_ti
       bytes += 2 * bytes_of_image(half_pixels, half_pixels, (loads ? 4 : 1) * bytes_of_intensity,
                                   bytes_of_tile);
     } else {
-      bytes += 2 * (bytes_of_rows(half_pixels) + bytes_of_rows(own + 2 * 16));
+      // Which CUDA's texture units filter in half precision.
+      const double bytes_of_half_pixel = cuda ? 2 : bytes_of_intensity;
+      bytes += 2 * bytes_of_rows(half_pixels, bytes_of_half_pixel);
+      bytes += 2 * bytes_of_rows(own + 2 * 16, bytes_of_intensity);
       bytes += 2 * own * own * maps * bytes_of_map;
     }
   }

@@ -35,7 +35,9 @@ bool is_kernel_of_the_schedule(const void* function) {
   for (const int model : {CAMERA_KANNALA_BRANDT, CAMERA_DOUBLE_SPHERE, -1}) {
     for (const auto& get : {kernel::cuda::paper_kernels, kernel::cuda::affine_paper_kernels,
                             kernel::cuda::pyramid_kernels}) {
-      if (contains(get(model), function)) return true;
+      for (const int sources : {1, 2}) {
+        if (contains(get(model, sources), function)) return true;
+      }
     }
   }
   return false;

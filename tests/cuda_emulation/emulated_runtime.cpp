@@ -337,8 +337,10 @@ cudaError_t cudaCreateTextureObject(cudaTextureObject_t* texture, const cudaReso
   if (const cudaError_t error = step_outside_capture()) return error;
   constexpr std::size_t pitch_alignment = 32;
   const auto& memory = resource->res.pitch2D;
-  const bool is_float = memory.desc.x == 32 && memory.desc.y == 0 && memory.desc.z == 0 &&
-                        memory.desc.w == 0 && memory.desc.f == cudaChannelFormatKindFloat;
+  const int texel_bytes = memory.desc.x / 8;
+  const bool is_float = (texel_bytes == 4 || texel_bytes == 2) && memory.desc.y == 0 &&
+                        memory.desc.z == 0 && memory.desc.w == 0 &&
+                        memory.desc.f == cudaChannelFormatKindFloat;
   const bool emulated = resource->resType == cudaResourceTypePitch2D && is_float &&
                         how->filterMode == cudaFilterModeLinear && how->normalizedCoords == 0 &&
                         how->addressMode[0] == cudaAddressModeClamp &&
@@ -346,12 +348,12 @@ cudaError_t cudaCreateTextureObject(cudaTextureObject_t* texture, const cudaReso
   const auto allocation = allocations().find(memory.devPtr);
   const bool fits = allocation != allocations().end() &&
                     memory.pitchInBytes % pitch_alignment == 0 &&
-                    memory.width * sizeof(float) <= memory.pitchInBytes &&
+                    memory.width * static_cast<std::size_t>(texel_bytes) <= memory.pitchInBytes &&
                     memory.pitchInBytes * memory.height <= allocation->second;
   if (!emulated || !fits) return cudaErrorInvalidValue;
   *texture = reinterpret_cast<cudaTextureObject_t>(new EmulatedTexture{
-      static_cast<const float*>(memory.devPtr), static_cast<int>(memory.width),
-      static_cast<int>(memory.height), static_cast<int>(memory.pitchInBytes / sizeof(float))});
+      memory.devPtr, texel_bytes, static_cast<int>(memory.width), static_cast<int>(memory.height),
+      static_cast<int>(memory.pitchInBytes) / texel_bytes});
   ++emulation().live_objects;
   return cudaSuccess;
 }

@@ -172,7 +172,10 @@ TEST(Work, OfAScheduleAddsUp) {
   const PatchOperations of = patch_operations(schedule.constants);
   EXPECT_EQ(work.operations, pixels / 2 * 8 * (121 * of.of_sample + of.of_patch));
   // Rays, the image, the source's half pixels and all planes read, one colour's planes written.
-  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 16 + 16) + pixels / 2 * 16);
+  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 4 * 2 + 16) + pixels / 2 * 16);
+  options.filter = Filter::exact;
+  EXPECT_EQ(work_of(make_schedule(fisheye_rig(64), options), iterate).bytes,
+            pixels * (16 + 4 + 4 * 4 + 16) + pixels / 2 * 16);
   for (const Dispatch& dispatch : schedule.dispatches) {
     EXPECT_GT(work_of(schedule, dispatch).bytes, 0) << to_string(dispatch.kernel);
   }

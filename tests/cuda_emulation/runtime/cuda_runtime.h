@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "cuda_fp16.h"
 #include "cuda_runtime_api.h"
 
 #define __device__
@@ -24,8 +25,14 @@ T __ldg(const T* address) {
 
 /// What a texture object is a handle of.
 struct EmulatedTexture {
-  const float* texels;
+  const void* texels;
+  int texel_bytes;  // of floats, or of half precision
   int width, height, stride;
+
+  float at(int i) const {
+    if (texel_bytes == sizeof(float)) return static_cast<const float*>(texels)[i];
+    return static_cast<const __half*>(texels)[i];
+  }
 };
 
 // As the programming guide defines linear filtering, with weights of eight bits.
@@ -47,7 +54,7 @@ T tex2D(cudaTextureObject_t object, float x, float y) {
                   : column + dx < texture.width ? column + dx
                                                 : texture.width - 1;
     const int j = row + dy < 0 ? 0 : row + dy < texture.height ? row + dy : texture.height - 1;
-    return texture.texels[j * texture.stride + i];
+    return texture.at(j * texture.stride + i);
   };
   return (1 - fx) * (1 - fy) * texel(0, 0) + fx * (1 - fy) * texel(1, 0) +
          (1 - fx) * fy * texel(0, 1) + fx * fy * texel(1, 1);
