@@ -21,38 +21,41 @@ set(spirv_folder ${PROJECT_BINARY_DIR}/shaders)
 file(MAKE_DIRECTORY ${spirv_folder})
 
 set(spirv_modules)
-# The kernel `name` is `source`, compiled with further definitions.
-function(widestereo_shader name source)
-  # With texture units, and as NAME_loads without (shaders/bindings.glsl).
-  foreach(suffix IN ITEMS "" _loads)
-    set(module ${spirv_folder}/${name}${suffix}.spv)
-    set(definitions ${ARGN})
-    if(suffix)
-      list(APPEND definitions -DTEXEL_LOADS)
-    endif()
-    set(steps COMMAND ${WIDESTEREO_GLSLANG} --quiet -V --target-env ${WIDESTEREO_SPIRV_TARGET}
-                      ${definitions} -I${shader_folder} --depfile ${module}.d
-                      -o ${module} ${shader_folder}/${source})
-    if(WIDESTEREO_SPIRV_OPT)
-      list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_OPT} --target-env=${WIDESTEREO_SPIRV_TARGET} -O
-                                ${module} -o ${module})
-    endif()
-    if(WIDESTEREO_SPIRV_VAL)
-      list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_VAL} --target-env ${WIDESTEREO_SPIRV_TARGET}
-                                ${module})
-    endif()
-    add_custom_command(OUTPUT ${module} ${steps} DEPENDS ${shader_folder}/${source} DEPFILE ${module}.d
-                       COMMENT "Compiling the kernel ${name}${suffix}" VERBATIM)
-    list(APPEND spirv_modules ${module})
-  endforeach()
-  set(spirv_modules ${spirv_modules} PARENT_SCOPE)
+# The module `name` is `source`, compiled with further definitions.
+function(widestereo_module name source)
+  set(module ${spirv_folder}/${name}.spv)
+  set(steps COMMAND ${WIDESTEREO_GLSLANG} --quiet -V --target-env ${WIDESTEREO_SPIRV_TARGET}
+                    ${ARGN} -I${shader_folder} --depfile ${module}.d
+                    -o ${module} ${shader_folder}/${source})
+  if(WIDESTEREO_SPIRV_OPT)
+    list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_OPT} --target-env=${WIDESTEREO_SPIRV_TARGET} -O
+                              ${module} -o ${module})
+  endif()
+  if(WIDESTEREO_SPIRV_VAL)
+    list(APPEND steps COMMAND ${WIDESTEREO_SPIRV_VAL} --target-env ${WIDESTEREO_SPIRV_TARGET}
+                              ${module})
+  endif()
+  add_custom_command(OUTPUT ${module} ${steps} DEPENDS ${shader_folder}/${source} DEPFILE ${module}.d
+                     COMMENT "Compiling the kernel ${name}" VERBATIM)
+  set(spirv_modules ${spirv_modules} ${module} PARENT_SCOPE)
 endfunction()
+
+# With texture units, and as NAME_loads without (shaders/bindings.glsl).
+macro(widestereo_shader name source)
+  widestereo_module(${name} ${source} ${ARGN})
+  widestereo_module(${name}_loads ${source} ${ARGN} -DTEXEL_LOADS)
+endmacro()
 
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${shader_folder}/kernel_list.h)
 file(STRINGS ${shader_folder}/kernel_list.h kernels REGEX "^KERNEL")
 foreach(kernel IN LISTS kernels)
   string(REGEX MATCH "^KERNEL\\(([a-z0-9_]+), ([A-Z]+)\\)" matched "${kernel}")
-  widestereo_shader(${CMAKE_MATCH_1} kernel.comp -DKERNEL=${CMAKE_MATCH_1}_pixel -DVIEW=${CMAKE_MATCH_2})
+  set(name ${CMAKE_MATCH_1})
+  set(of_kernel kernel.comp -DKERNEL=${name}_pixel -DVIEW=${CMAKE_MATCH_2})
+  widestereo_shader(${name} ${of_kernel})
+  if(name STREQUAL "interpolate")
+    widestereo_module(interpolate_half ${of_kernel} -DHALF_PRECISION)
+  endif()
 endforeach()
 # Of Vulkan alone: where an application's image is read or map is written.
 foreach(conversion IN ITEMS export_map import_image import_texture)

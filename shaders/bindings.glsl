@@ -5,7 +5,8 @@
 //
 // Every kernel is compiled twice, for images that are read with the same bits. GPUs gather or filter four texels in one
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
-// and have the four half pixels of a sample in one texel, which takes them much less than four texels of one.
+// and have the four half pixels of a sample in one texel, which takes them much less than four texels of one. Where texture
+// units filter, `interpolate` is compiled once more, for half pixels of half precision (HALF_PRECISION).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -33,6 +34,8 @@ layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest
 layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
 #ifdef TEXEL_LOADS
 layout(set = 0, binding = 8, rgba32f) uniform image2DArray half_pixels;  // with the right, lower and lower right one
+#elif defined HALF_PRECISION
+layout(set = 0, binding = 8, r16f) uniform image2DArray half_pixels;
 #else
 layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
 #endif
@@ -83,10 +86,12 @@ vec4 half_pixel_taps(int view, ivec2 p) { return imageLoad(half_pixels, in_half_
 
 float intensity_in_row(IntensityRow row, int dx) { return texelFetch(intensity_texture, row + ivec3(dx, 0, 0), 0).x; }
 
+// Asked for once, not for each sample.
+vec2 half_pixel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
+
 // Texture coordinates of a position in texels of the memory.
 vec3 half_pixel_position(int view, vec2 texel) {
-  vec2 texel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
-  return vec3(texel * texel_size, float(layer_of_half_pixels(view)));
+  return vec3(texel * half_pixel_size, float(layer_of_half_pixels(view)));
 }
 
 vec4 half_pixel_taps(int view, ivec2 p) {
@@ -104,7 +109,12 @@ float filtered_half_pixel(int view, vec2 texel) {
 float intensity_at(int view, ivec2 p) { return intensity_in_row(intensity_row(view, p), 0); }
 
 // Images of one number a texel take the first.
-void store_half_pixel(int view, ivec2 p, vec4 taps) { imageStore(half_pixels, in_half_pixels(view, p), taps); }
+void store_half_pixel(int view, ivec2 p, vec4 taps) {
+#ifdef HALF_PRECISION
+  taps = max(taps, vec4(LOWEST_HALF));
+#endif
+  imageStore(half_pixels, in_half_pixels(view, p), taps);
+}
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(view, p)); }
 

@@ -9,6 +9,8 @@
 // that patches need no checks of their own.
 #define APRON 16
 #define MASKED_INTENSITY -1e30f
+// Stands for it in half precision, of which it is the lowest number.
+#define LOWEST_HALF -65504.0f
 
 // Of a pixel without a plane: the largest cost of all.
 #define INVALID_COST 2.0f

@@ -93,7 +93,7 @@ struct Algorithm {
   }
   FN void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
     if (FILTER == FILTER_DEVICE) {
-      const float representable = max(taps.x, lowest_half);
+      const float representable = max(taps.x, LOWEST_HALF);
       *half_pixel_address<__half>(CONTEXT view, p) = __float2half_rn(representable);
     } else {
       *half_pixel_address<float>(CONTEXT view, p) = taps.x;

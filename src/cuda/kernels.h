@@ -30,8 +30,7 @@ struct ViewMemory {
 /// Half pixels that texture units filter have half precision: texels of fewer bytes collide less in
 /// the texture cache, which bounds the search. Those that are filtered exactly are floats.
 constexpr int half_pixel_bytes(bool filtered_by_device) { return filtered_by_device ? 2 : 4; }
-/// The lowest number of half precision stands for MASKED_INTENSITY there.
-constexpr float lowest_half = -65504.0f;
+/// Of LOWEST_HALF.
 constexpr unsigned short lowest_half_bits = 0xfbff;
 
 /// What a kernel sees besides its pixel: the one argument of every kernel.

@@ -71,6 +71,12 @@ void VulkanContext::create_device() {
     info.enabledExtensionCount = 1;
     info.ppEnabledExtensionNames = &portability_subset;
   }
+  handles_.extended_storage_formats =
+      has_extended_storage_formats(instance_functions_, handles_.physical_device);
+  VkPhysicalDeviceFeatures features{};
+  features.shaderStorageImageExtendedFormats =
+      handles_.extended_storage_formats ? VK_TRUE : VK_FALSE;
+  info.pEnabledFeatures = &features;
   check(instance_functions_.vkCreateDevice(handles_.physical_device, &info, nullptr,
                                            &handles_.device),
         "be opened");
@@ -86,7 +92,10 @@ void VulkanContext::load_functions() {
 }
 
 DeviceInfo VulkanContext::info() const {
-  return describe(instance_functions_, handles_.physical_device, 0);
+  DeviceInfo info = describe(instance_functions_, handles_.physical_device, 0);
+  // An application may not have enabled what the device offers.
+  info.filters_intensities = info.filters_intensities && filters_intensities();
+  return info;
 }
 
 VkImageFormatProperties VulkanContext::image_limits(VkFormat format,
@@ -99,7 +108,13 @@ VkImageFormatProperties VulkanContext::image_limits(VkFormat format,
 }
 
 bool VulkanContext::filters_intensities() const {
-  return widestereo::filters_intensities(instance_functions_, handles_.physical_device);
+  return filters_half_precision() ||
+         widestereo::filters_intensities(instance_functions_, handles_.physical_device);
+}
+
+bool VulkanContext::filters_half_precision() const {
+  return handles_.extended_storage_formats &&
+         widestereo::filters_half_precision(instance_functions_, handles_.physical_device);
 }
 
 std::uint32_t VulkanContext::memory_type(std::uint32_t allowed,

@@ -34,8 +34,9 @@ class VulkanContext {
 
   /// Largest extent and layer count of such an image; zeros where it is not supported at all.
   VkImageFormatProperties image_limits(VkFormat format, VkImageUsageFlags usage) const;
-  /// Whether images of intensities can be filtered.
+  /// Whether images of intensities can be filtered, in half precision if so.
   bool filters_intensities() const;
+  bool filters_half_precision() const;
   /// First memory type of `allowed` with all of `wanted`, or VK_MAX_MEMORY_TYPES.
   std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
   /// Throws Error when a call failed; `action` completes "could not ...".

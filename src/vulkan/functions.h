@@ -19,6 +19,7 @@ namespace widestereo {
   X(vkGetPhysicalDeviceProperties2)               \
   X(vkGetPhysicalDeviceQueueFamilyProperties)     \
   X(vkGetPhysicalDeviceMemoryProperties)          \
+  X(vkGetPhysicalDeviceFeatures)                  \
   X(vkGetPhysicalDeviceFormatProperties)          \
   X(vkGetPhysicalDeviceImageFormatProperties)     \
   X(vkCreateDevice)                               \

@@ -81,7 +81,9 @@ void require_image_limits(const VulkanContext& context, VkFormat format, cv::Siz
   if (layers > static_cast<long long>(limits.maxArrayLayers)) {
     refuse("maxImageArrayLayers", std::to_string(limits.maxArrayLayers));
   }
-  const VkDeviceSize bytes_of_pixel = format == VK_FORMAT_R32_SFLOAT ? 4 : 16;
+  const VkDeviceSize bytes_of_pixel = format == VK_FORMAT_R16_SFLOAT   ? 2
+                                      : format == VK_FORMAT_R32_SFLOAT ? 4
+                                                                       : 16;
   const VkDeviceSize bytes = bytes_of_pixel * static_cast<VkDeviceSize>(size.width) *
                              static_cast<VkDeviceSize>(size.height) *
                              static_cast<VkDeviceSize>(layers);

@@ -60,6 +60,19 @@ bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device) {
                     VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
 }
 
+bool has_extended_storage_formats(const InstanceFunctions& vk, VkPhysicalDevice device) {
+  VkPhysicalDeviceFeatures features{};
+  vk.vkGetPhysicalDeviceFeatures(device, &features);
+  return features.shaderStorageImageExtendedFormats == VK_TRUE;
+}
+
+bool filters_half_precision(const InstanceFunctions& vk, VkPhysicalDevice device) {
+  return has_format(vk, device, VK_FORMAT_R16_SFLOAT,
+                    VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT |
+                        VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT |
+                        VK_FORMAT_FEATURE_TRANSFER_DST_BIT);
+}
+
 VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysicalDevice device) {
   VkPhysicalDeviceProperties properties{};
   vk.vkGetPhysicalDeviceProperties(device, &properties);
@@ -163,7 +176,9 @@ DeviceInfo describe(const InstanceFunctions& vk, VkPhysicalDevice device, int in
   if (plain.apiVersion < VK_API_VERSION_1_1) return info;
   // Devices that are programs have no texture units: exact filtering costs them less.
   info.filters_intensities =
-      plain.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU && filters_intensities(vk, device);
+      plain.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU &&
+      (filters_intensities(vk, device) ||
+       (has_extended_storage_formats(vk, device) && filters_half_precision(vk, device)));
 
   VkPhysicalDeviceDriverProperties driver{};
   driver.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES;

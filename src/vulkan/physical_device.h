@@ -35,5 +35,9 @@ bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, 
 
 /// Whether images of intensities can be filtered.
 bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device);
+/// Whether it offers shaderStorageImageExtendedFormats.
+bool has_extended_storage_formats(const InstanceFunctions& vk, VkPhysicalDevice device);
+/// With that feature, whether images of half precision can be written and filtered.
+bool filters_half_precision(const InstanceFunctions& vk, VkPhysicalDevice device);
 
 }  // namespace widestereo

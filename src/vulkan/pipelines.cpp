@@ -84,12 +84,17 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
                      VkPipelineCache cache)
-    : constants_(constants), sampled_(sampled) {
+    : constants_(constants),
+      sampled_(sampled),
+      half_precision_(constants.filter == static_cast<int>(Filter::device) &&
+                      context.filters_half_precision()) {
   make_layouts(context);
   for (int i = 0; i < kernel_count; ++i) {
     const Kernel kernel = static_cast<Kernel>(i);
     if (kernel == Kernel::iterate_raster) continue;
-    pipelines_[static_cast<std::size_t>(i)] = make(context, to_string(kernel), layout(), cache);
+    const bool writes_halves = kernel == Kernel::interpolate && half_precision_;
+    pipelines_[static_cast<std::size_t>(i)] =
+        make(context, writes_halves ? "interpolate_half" : to_string(kernel), layout(), cache);
   }
 }
 

@@ -44,11 +44,13 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 class Pipelines {
  public:
   /// `sampled`: intensities are read through the texture units instead of as storage images, which
-  /// hold half pixels in another format (shaders/bindings.glsl).
+  /// hold half pixels in another format (shaders/bindings.glsl). Those that texture units filter
+  /// have half precision where the device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);
 
   bool sampled() const { return sampled_; }
+  bool half_precision() const { return half_precision_; }
   VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
   VkPipelineLayout layout() const { return layout_.get(); }
   /// Throws Error for iterate_raster.
@@ -62,6 +64,7 @@ class Pipelines {
 
   KernelConstants constants_;
   bool sampled_;
+  bool half_precision_;
   Handle<VkDescriptorSetLayout> set_layout_;
   Handle<VkPipelineLayout> layout_;
   std::array<Handle<VkPipeline>, kernel_count> pipelines_;

@@ -40,17 +40,18 @@ double documented_bytes(const DeviceInfo& device, int levels, double bytes_of_ti
   // Vulkan stages transfers of one map in a buffer.
   const bool levels_share_layers = device.kind == DeviceKind::vulkan;
   double bytes = side * side * (bytes_of_transfer + (levels_share_layers ? 16 : 0));
-  // Software Vulkan keeps each half pixel with its right, lower and lower right neighbour.
+  // Software Vulkan keeps each half pixel with its right, lower and lower right neighbour; texture
+  // units filter half precision.
   const bool loads = levels_share_layers && device.type == "cpu";
+  const double bytes_of_half_pixel = loads                            ? 4 * bytes_of_intensity
+                                     : device.kind == DeviceKind::cpu ? bytes_of_intensity
+                                                                      : 2;
   for (int level = 0; level < levels; ++level) {
     const double own = side / (1 << level);
     const double half_pixels = 2 * own + 2 * 32;
     if (levels_share_layers) {
-      bytes += 2 * bytes_of_image(half_pixels, half_pixels, (loads ? 4 : 1) * bytes_of_intensity,
-                                  bytes_of_tile);
+      bytes += 2 * bytes_of_image(half_pixels, half_pixels, bytes_of_half_pixel, bytes_of_tile);
     } else {
-      // Which CUDA's texture units filter in half precision.
-      const double bytes_of_half_pixel = cuda ? 2 : bytes_of_intensity;
       bytes += 2 * bytes_of_rows(half_pixels, bytes_of_half_pixel);
       bytes += 2 * bytes_of_rows(own + 2 * 16, bytes_of_intensity);
       bytes += 2 * own * own * maps * bytes_of_map;

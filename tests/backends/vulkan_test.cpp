@@ -163,20 +163,33 @@ TEST(VulkanMatch, TextureUnitsFilterAsWellAsTheirPositions) {
   Application application;
   KernelFixture match = small_match();
   keep_first(match.schedule(), Kernel::initialise);  // no choice amplifies rounding
-  std::vector<cv::Mat> results;
-  for (const Filter filter : {Filter::exact, Filter::device}) {
+  const auto costs = [&](const VulkanContext& context, Filter filter) {
     match.schedule().constants.filter = static_cast<int>(filter);
-    VulkanBackend backend(application.context, sizes_of(match.rig()), match.schedule().constants,
+    VulkanBackend backend(context, sizes_of(match.rig()), match.schedule().constants,
                           application.cache, {.sampled = true});
-    results.push_back(run(backend, match));
-  }
-  cv::Mat difference;
-  cv::absdiff(results[0], results[1], difference);
-  double largest = 0;
-  cv::minMaxLoc(difference, nullptr, &largest);
-  EXPECT_GT(largest, 0) << "the texture units were not used";
-  // Planes have the same bits; costs differ as positions do, and by all where visibility flips.
-  EXPECT_LT(cv::countNonZero(difference > 0.02), 4);
+    return std::pair(run(backend, match), static_cast<double>(backend.device_bytes()));
+  };
+  VulkanHandles without_feature = application.context.handles();
+  without_feature.extended_storage_formats = false;
+  const VulkanContext in_floats(without_feature);
+  const auto [exact, of_exact] = costs(application.context, Filter::exact);
+  const auto [floats, of_floats] = costs(in_floats, Filter::device);
+  const auto [halves, of_halves] = costs(application.context, Filter::device);
+  ASSERT_TRUE(application.context.filters_half_precision()) << "which Vulkan's profiles ask for";
+  const auto expect_close = [](const cv::Mat& a, const cv::Mat& b) {
+    cv::Mat difference;
+    cv::absdiff(a, b, difference);
+    double largest = 0;
+    cv::minMaxLoc(difference, nullptr, &largest);
+    EXPECT_GT(largest, 0) << "both were filtered alike";
+    // Planes have the same bits; costs differ as positions do, and by all where visibility flips.
+    EXPECT_LT(cv::countNonZero(difference > 0.02), 4);
+  };
+  expect_close(exact, floats);
+  expect_close(exact, halves);
+  expect_close(floats, halves);
+  EXPECT_EQ(of_exact, of_floats);
+  EXPECT_LT(of_halves, of_floats);
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
