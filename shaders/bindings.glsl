@@ -15,6 +15,7 @@ layout(constant_id = 0) const int WINDOW_RADIUS = 5;
 layout(constant_id = 1) const int WARP = 0;
 layout(constant_id = 2) const int CAMERA_MODEL = -1;
 layout(constant_id = 3) const int SOURCE_COUNT = 1;
+#define ONE_SOURCE (SOURCE_COUNT == 1)
 layout(constant_id = 4) const int PATTERN = 0;
 layout(constant_id = 5) const int WEIGHTED = 0;
 #ifdef TEXEL_LOADS

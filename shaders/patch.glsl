@@ -322,7 +322,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
 
 // Mean over the best sources that see the patch; INVALID_COST when none does.
 FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
-  if (SOURCE_COUNT == 1) return source_cost(CONTEXT source_at(CONTEXT 0), pixel, m);
+  if (ONE_SOURCE) return source_cost(CONTEXT source_at(CONTEXT 0), pixel, m);
   float best[MAX_IMAGES];
   int count = 0;
   for (int i = 0; i < SOURCE_COUNT; ++i) {

@@ -16,6 +16,7 @@
 //   void  store_half_pixel(view, texel, vec4)   as half_pixel_taps() reads them, of which memories may keep the first
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
 //   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl;
+//   SOURCE_COUNT                            of a view, and ONE_SOURCE, whether a compiler knows it to be 1
 //   VIEW_OF_LAUNCH                          which of the views that one launch runs over this thread has, from 0.
 #ifndef WIDESTEREO_PORTABLE_H
 #define WIDESTEREO_PORTABLE_H

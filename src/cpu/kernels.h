@@ -43,6 +43,7 @@ struct Context {
 #define WARP context.constants.warp
 #define CAMERA_MODEL context.constants.camera_model
 #define SOURCE_COUNT context.constants.source_count
+#define ONE_SOURCE false
 #define VIEW_OF_LAUNCH context.view_of_launch
 #define PATTERN context.constants.pattern
 #define WEIGHTED context.constants.weighted

@@ -37,6 +37,7 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1>;
 #define FILTER (C::filter >= 0 ? C::filter : context.filter)
 #define CAMERA_MODEL (C::camera_model >= 0 ? C::camera_model : context.camera_model)
 #define SOURCE_COUNT (C::source_count >= 0 ? C::source_count : context.source_count)
+#define ONE_SOURCE (C::source_count == 1)
 #define VIEW_OF_LAUNCH static_cast<int>(blockIdx.z)
 #define HAS_DEVICE_FILTER
 #undef PARAMETERS
