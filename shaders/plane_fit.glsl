@@ -44,10 +44,8 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float fall_off = 0.25f / float(radius * radius);  // of the eighth root of the Gaussian
   // Every tile's grids lie elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4_of_tile(CONTEXT pixel, REGRESSION_SLOT + round);
-  int first_x = pixel.x - radius + int(u.x * float(step)) - step / 2;
-  int first_y = pixel.y - radius + int(u.y * float(step)) - step / 2;
-  while (first_x < 0) first_x += step;
-  while (first_y < 0) first_y += step;
+  int first_x = pixel.x + first_in_image(pixel.x, int(u.x * float(step)) - step / 2 - radius, step);
+  int first_y = pixel.y + first_in_image(pixel.y, int(u.y * float(step)) - step / 2 - radius, step);
   int last_x = min(pixel.x + radius, size.x - 1);
   int last_y = min(pixel.y + radius, size.y - 1);
   float s = 0.0f;

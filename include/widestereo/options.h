@@ -42,8 +42,9 @@ enum class Interpolation : int {
 enum class Filter : int {
   exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
   device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their
-               ///< positions are rounded, to 1/512 pixel on most. Exact on CPUs and on Vulkan
-               ///< devices that cannot filter 32-bit floats (StereoResult::filter says which)
+               ///< positions are rounded, to 1/512 pixel on most, and half pixels have half
+               ///< precision, where a Vulkan device can write that. Exact on CPUs and on Vulkan
+               ///< devices that cannot filter floats (StereoResult::filter says which)
 };
 
 /// How planes are found.
