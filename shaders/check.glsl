@@ -120,12 +120,9 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   float supporting = 0.0f;
   float evidence = 0.0f;
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  int first_x = first_in_image(pixel.x, -SUPPORT_RADIUS, SUPPORT_STEP);
-  int first_y = first_in_image(pixel.y, -SUPPORT_RADIUS, SUPPORT_STEP);
-  int last_x = min(SUPPORT_RADIUS, size.x - 1 - pixel.x);
-  int last_y = min(SUPPORT_RADIUS, size.y - 1 - pixel.y);
-  for (int dy = first_y; dy <= last_y; dy += SUPPORT_STEP) {
-    for (int dx = first_x; dx <= last_x; dx += SUPPORT_STEP) {
+  ivec4 grid = grid_in_image(size, pixel, ivec2(-SUPPORT_RADIUS, -SUPPORT_RADIUS), SUPPORT_RADIUS, SUPPORT_STEP);
+  for (int dy = grid.y; dy <= grid.w; dy += SUPPORT_STEP) {
+    for (int dx = grid.x; dx <= grid.z; dx += SUPPORT_STEP) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
       // No branches, so that planes are loaded ahead.
       float counts = plane.w < INVALID_COST && (dx != 0 || dy != 0) ? 1.0f : 0.0f;

@@ -35,12 +35,9 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     float fall_off = 2.0f / float(NORMAL_VOTE_RADIUS * NORMAL_VOTE_RADIUS);
     float inverse_scale = PARAMETERS.support.y;
-    int first_x = first_in_image(pixel.x, -NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP);
-    int first_y = first_in_image(pixel.y, -NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP);
-    int last_x = min(NORMAL_VOTE_RADIUS, size.x - 1 - pixel.x);
-    int last_y = min(NORMAL_VOTE_RADIUS, size.y - 1 - pixel.y);
-    for (int dy = first_y; dy <= last_y; dy += NORMAL_VOTE_STEP) {
-      for (int dx = first_x; dx <= last_x; dx += NORMAL_VOTE_STEP) {
+    ivec4 grid = grid_in_image(size, pixel, ivec2(-NORMAL_VOTE_RADIUS, -NORMAL_VOTE_RADIUS), NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP);
+    for (int dy = grid.y; dy <= grid.w; dy += NORMAL_VOTE_STEP) {
+      for (int dx = grid.x; dx <= grid.z; dx += NORMAL_VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         if (plane.w >= INVALID_COST) continue;

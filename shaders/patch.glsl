@@ -14,6 +14,13 @@ FN int first_in_image(int x, int first, int step) {
   return first;
 }
 
+// The offsets from the pixel of a grid from `first` to `radius` that lie in the image: the first ones (x, y) and the
+// limits of the last (z, w).
+FN ivec4 grid_in_image(ivec4 size, ivec2 pixel, ivec2 first, int radius, int step) {
+  return ivec4(first_in_image(pixel.x, first.x, step), first_in_image(pixel.y, first.y, step),
+               min(radius, size.x - 1 - pixel.x), min(radius, size.y - 1 - pixel.y));
+}
+
 FN ivec2 nearest_in_image(ivec4 size, ivec2 pixel) {
   return ivec2(clamp(pixel.x, 0, size.x - 1), clamp(pixel.y, 0, size.y - 1));
 }

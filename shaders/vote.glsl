@@ -138,12 +138,10 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float most = 0.0f;
     // Every tile asks others, so that its neighbours do not make the same mistake.
     vec4 u = draw4_of_tile(CONTEXT pixel, VOTE_SLOT);
-    int first_x = first_in_image(pixel.x, int(u.x * float(VOTE_STEP)) - PASS.radius, VOTE_STEP);
-    int first_y = first_in_image(pixel.y, int(u.y * float(VOTE_STEP)) - PASS.radius, VOTE_STEP);
-    int last_x = min(PASS.radius, size.x - 1 - pixel.x);
-    int last_y = min(PASS.radius, size.y - 1 - pixel.y);
-    for (int dy = first_y; dy <= last_y; dy += VOTE_STEP) {
-      for (int dx = first_x; dx <= last_x; dx += VOTE_STEP) {
+    ivec2 first = ivec2(int(u.x * float(VOTE_STEP)) - PASS.radius, int(u.y * float(VOTE_STEP)) - PASS.radius);
+    ivec4 grid = grid_in_image(size, pixel, first, PASS.radius, VOTE_STEP);
+    for (int dy = grid.y; dy <= grid.w; dy += VOTE_STEP) {
+      for (int dx = grid.x; dx <= grid.z; dx += VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         float place = scale * inverse_distance_of(plane, ray);

@@ -19,8 +19,9 @@ std::size_t area(cv::Size size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }
 
+/// Texels of fewer bytes collide less in the texture cache, which would bound the search.
 int half_pixel_bytes(const KernelConstants& constants) {
-  return kernel::cuda::half_pixel_bytes(constants.filter == static_cast<int>(Filter::device));
+  return constants.filter == static_cast<int>(Filter::device) ? 2 : 4;
 }
 
 /// Parameters may differ: launches read them from device memory.

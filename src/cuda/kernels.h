@@ -16,8 +16,10 @@ constexpr int block_height = 8;
 /// Device memory of one view, row-major, `width` pixels a row.
 struct ViewMemory {
   const float4* rays;
-  float* intensities;           ///< of pixel (0, 0); APRON masked ones surround the image
-  void* half_pixels;            ///< likewise; HALF_PIXEL_APRON masked ones surround them
+  float* intensities;  ///< of pixel (0, 0); APRON masked ones surround the image
+  /// Likewise; HALF_PIXEL_APRON masked ones surround them. Of half precision where texture units
+  /// filter, else floats.
+  void* half_pixels;
   cudaTextureObject_t texture;  ///< over the half pixels, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
   float4* checks;
@@ -27,9 +29,6 @@ struct ViewMemory {
   int half_pixel_stride;  ///< likewise
 };
 
-/// Half pixels that texture units filter have half precision: texels of fewer bytes collide less in
-/// the texture cache, which bounds the search. Those that are filtered exactly are floats.
-constexpr int half_pixel_bytes(bool filtered_by_device) { return filtered_by_device ? 2 : 4; }
 /// Of LOWEST_HALF.
 constexpr unsigned short lowest_half_bits = 0xfbff;
 
