@@ -2,9 +2,10 @@
 // What is known about a pixel once all views have planes: agreement with the sources' own planes and with the
 // surroundings, texture, parallax and tilt, summed up as reasons for rejection and a confidence.
 
-// The surroundings of a pixel: a sparse grid of this radius and step.
+// The surroundings of a pixel: a sparse grid of this radius and step. A vote asks for speckles alone, which takes fewer.
 #define SUPPORT_RADIUS 20
 #define SUPPORT_STEP 4
+#define SUPPORT_STEP_FOR_VOTE 10
 // Share of the range of inverse distance over which a point's speed is measured, and its inverse (see VELOCITY_STEP).
 #define SPEED_STEP 0.01f
 #define PER_SPEED_STEP 100.0f
@@ -115,14 +116,14 @@ FN float speed_in_sources(CONTEXT_ARGUMENT vec3 ray, float w) {
 
 // Of the surrounding planes: the share that puts the pixel's point where its own does (x) and EVIDENCE_SCALE times the
 // mean of their squared correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
-FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
+FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed, int step) {
   float planes = 0.0f;
   float supporting = 0.0f;
   float evidence = 0.0f;
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  ivec4 grid = grid_in_image(size, pixel, ivec2(-SUPPORT_RADIUS, -SUPPORT_RADIUS), SUPPORT_RADIUS, SUPPORT_STEP);
-  for (int dy = grid.y; dy <= grid.w; dy += SUPPORT_STEP) {
-    for (int dx = grid.x; dx <= grid.z; dx += SUPPORT_STEP) {
+  ivec4 grid = grid_in_image(size, pixel, ivec2(-SUPPORT_RADIUS, -SUPPORT_RADIUS), SUPPORT_RADIUS, ivec2(step, step));
+  for (int dy = grid.y; dy <= grid.w; dy += step) {
+    for (int dx = grid.x; dx <= grid.z; dx += step) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
       // No branches, so that planes are loaded ahead.
       float counts = plane.w < INVALID_COST && (dx != 0 || dy != 0) ? 1.0f : 0.0f;
@@ -180,8 +181,11 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       if (candidate.y < difference.y) difference = candidate;
     }
     vec4 limits = PARAMETERS.check_limits;
-    float variance = reference_variance(CONTEXT pixel);
-    vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
+    bool for_vote = (PASS.candidates & CHECK_FOR_VOTE) != 0u;
+    bool needs_variance = !for_vote || PARAMETERS.patch_limits.x > 0.0f;
+    float variance = needs_variance ? reference_variance(CONTEXT pixel) : 0.0f;
+    int step = for_vote ? SUPPORT_STEP_FOR_VOTE : SUPPORT_STEP;
+    vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed, step);
     bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
     if (variance < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
     if (held.w > limits.z) reasons |= REASON_HIGH_COST;
@@ -193,7 +197,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       reasons |= REASON_INCONSISTENT;
     }
     if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
-    if ((PASS.candidates & CHECK_FOR_VOTE) != 0u) {
+    if (for_vote) {
       vec2 velocity;
       int source = telling_source(CONTEXT ray, w, velocity);
       difference.x = float(source);

@@ -35,7 +35,8 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     float fall_off = 2.0f / float(NORMAL_VOTE_RADIUS * NORMAL_VOTE_RADIUS);
     float inverse_scale = PARAMETERS.support.y;
-    ivec4 grid = grid_in_image(size, pixel, ivec2(-NORMAL_VOTE_RADIUS, -NORMAL_VOTE_RADIUS), NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP);
+    ivec4 grid = grid_in_image(size, pixel, ivec2(-NORMAL_VOTE_RADIUS, -NORMAL_VOTE_RADIUS), NORMAL_VOTE_RADIUS,
+                               ivec2(NORMAL_VOTE_STEP, NORMAL_VOTE_STEP));
     for (int dy = grid.y; dy <= grid.w; dy += NORMAL_VOTE_STEP) {
       for (int dx = grid.x; dx <= grid.z; dx += NORMAL_VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);

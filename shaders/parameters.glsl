@@ -22,7 +22,8 @@
 // radius and at it), the step between the pixels that vote, the planes that then compete with the pixel's own, and the
 // radius of the part of the patch that compares them.
 #define VOTE_CANDIDATES 16
-#define VOTE_STEP 3
+#define VOTE_STEP 4
+#define VOTE_ROW_STEP 3
 #define VOTE_RIVALS 2
 #define VOTE_MIDDLE_RADIUS 1
 
@@ -136,7 +137,7 @@ struct PassParameters {
   int radius;         // regression, vote, filling: pixels
   int steps;          // sweep: inverse distances; regression: of its grid of neighbours, in the radius
   float deviation;    // regression: standard deviation (source pixels) that is enough; 0: normals only
-  int places;         // ambiguity: other places tried for a better match
+  int places;         // ambiguity: other places tried for a better match; upsample: coarser pixels whose planes are tried
   float tolerance;    // regression: squared scale of its robust weights, as a share of the first round's
 };
 

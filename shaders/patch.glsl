@@ -16,8 +16,8 @@ FN int first_in_image(int x, int first, int step) {
 
 // The offsets from the pixel of a grid from `first` to `radius` that lie in the image: the first ones (x, y) and the
 // limits of the last (z, w).
-FN ivec4 grid_in_image(ivec4 size, ivec2 pixel, ivec2 first, int radius, int step) {
-  return ivec4(first_in_image(pixel.x, first.x, step), first_in_image(pixel.y, first.y, step),
+FN ivec4 grid_in_image(ivec4 size, ivec2 pixel, ivec2 first, int radius, ivec2 step) {
+  return ivec4(first_in_image(pixel.x, first.x, step.x), first_in_image(pixel.y, first.y, step.y),
                min(radius, size.x - 1 - pixel.x), min(radius, size.y - 1 - pixel.y));
 }
 

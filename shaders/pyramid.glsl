@@ -33,8 +33,8 @@ FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   store_hypothesis(CONTEXT REFERENCE, pixel, best);
 }
 
-// Starts a pixel from the best of the four nearest coarser pixels' planes: evaluated at the finer ray they
-// are exact, so slanted surfaces need no interpolation. A random plane where there is none.
+// Starts a pixel from the best of the PASS.places nearest coarser pixels' planes, of four: evaluated at the finer ray
+// they are exact, so slanted surfaces need no interpolation. A random plane where there is none.
 FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (!is_usable(CONTEXT pixel, usable_ray)) {
@@ -43,11 +43,14 @@ FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec4 best = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i <= PASS.places; ++i) {
     vec3 m = vec3(0.0f, 0.0f, 0.0f);
-    if (i < 4) {
-      ivec2 q = ivec2(pixel.x / 2 + (i & 1) * ((pixel.x & 1) * 2 - 1),
-                      pixel.y / 2 + (i >> 1) * ((pixel.y & 1) * 2 - 1));
+    if (i < PASS.places) {
+      // The one that holds the pixel, then the one across the nearest corner, which its plane resembles least.
+      bool beside = i == 1 || i == 2;
+      bool below = i == 1 || i == 3;
+      ivec2 q = ivec2(pixel.x / 2 + (beside ? (pixel.x & 1) * 2 - 1 : 0),
+                      pixel.y / 2 + (below ? (pixel.y & 1) * 2 - 1 : 0));
       if (!in_image(PARAMETERS.cameras[OTHER].size, q)) continue;
       vec4 parent = hypothesis_at(CONTEXT OTHER, q);
       m = vec3(parent.x, parent.y, parent.z);

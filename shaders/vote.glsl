@@ -11,8 +11,9 @@
 #define RIVAL_DISPLACEMENT 0.35f
 // Largest difference of intensity that counts: all that differ by more are alike.
 #define LARGEST_DIFFERENCE 0.08f
-// Square of the difference that noise alone leaves.
+// Square of the difference that noise alone leaves, and its inverse.
 #define EXPECTED_DIFFERENCE2 1e-4f
+#define LARGEST_LIKENESS 1e4f
 // Random slot; the search and the regression use lower ones.
 #define VOTE_SLOT 72
 // Pixels around whose intensities tell the gain: radius and step of their grid, and the rounds over them.
@@ -138,10 +139,13 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float most = 0.0f;
     // Every tile asks others, so that its neighbours do not make the same mistake.
     vec4 u = draw4_of_tile(CONTEXT pixel, VOTE_SLOT);
-    ivec2 first = ivec2(int(u.x * float(VOTE_STEP)) - PASS.radius, int(u.y * float(VOTE_STEP)) - PASS.radius);
-    ivec4 grid = grid_in_image(size, pixel, first, PASS.radius, VOTE_STEP);
-    for (int dy = grid.y; dy <= grid.w; dy += VOTE_STEP) {
-      for (int dx = grid.x; dx <= grid.z; dx += VOTE_STEP) {
+    ivec2 step = ivec2(VOTE_STEP, VOTE_ROW_STEP);
+    ivec2 first = ivec2(int(u.x * float(step.x)) - PASS.radius, int(u.y * float(step.y)) - PASS.radius);
+    ivec4 grid = grid_in_image(size, pixel, first, PASS.radius, step);
+    // Rows begin in turn half a step later, so that thin surfaces have their voters.
+    int late = 0;
+    for (int dy = grid.y; dy <= grid.w; dy += step.y) {
+      for (int dx = grid.x + late; dx <= grid.z; dx += step.x) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         float place = scale * inverse_distance_of(plane, ray);
@@ -152,6 +156,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
           support[i] += weight * support_between(place, candidates[i]);
         }
       }
+      late = VOTE_STEP / 2 - late;
     }
     prior = vec4(held.x, held.y, held.z, 1.0f);
     // The pixel's own plane comes first.
@@ -185,6 +190,8 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int k = 0; k < count; ++k) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
+      // Most rivals have so few votes that no likeness makes up for them.
+      if (votes[k] * LARGEST_LIKENESS <= best) continue;
       float score = votes[k] * likeness_of_middle(CONTEXT source, pixel, m, gain);
       if (score > best) {
         best = score;

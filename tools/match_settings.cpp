@@ -140,6 +140,10 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
               "First perturbation of a unit normal, at the coarsest level");
   add_pyramid("--source-planes", &Options::source_planes,
               "Try the source views' own planes: true or false");
+  add_pyramid("--coarse-planes", &Options::coarse_planes,
+              "Planes of coarser pixels that a finer one starts from the best of, 1 to 4");
+  add_pyramid("--alternate-strips", &Options::alternate_strips,
+              "Iterations try far and near pixels' planes by turns, not both: true or false");
   if (no_warm_start != nullptr) {
     add("--warm-iterations", &Options::warm_iterations,
         "Iterations of a frame started from the previous one")

@@ -123,6 +123,11 @@ struct Options {
   double step_normal = 0.5;   ///< first perturbation of a unit normal, at the coarsest level only,
                               ///< 0..2; halved each iteration
   bool source_planes = true;  ///< try the planes that the source views hold
+  /// Coarser pixels around a finer one whose planes it starts from, the best of them, 1..4.
+  int coarse_planes = 4;
+  /// On all levels but the coarsest, iterations try the planes of far pixels and of near ones by
+  /// turns instead of both.
+  bool alternate_strips = false;
 
   /// Of a frame that starts from the previous one's planes (Matcher::match_next()).
   int warm_iterations = 8;  ///< of every view, all at full size, 0..100000

@@ -27,8 +27,10 @@ KernelTable specialised_kernels(const KernelConstants& c) {
     return paper_kernels(c.camera_model, c.source_count);
   if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, false))
     return affine_paper_kernels(c.camera_model, c.source_count);
-  if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
-    return pyramid_kernels(c.camera_model, c.source_count);
+  if (is(quality_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
+    return quality_kernels(c.camera_model, c.source_count);
+  if (is(fast_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
+    return fast_kernels(c.camera_model, c.source_count);
   return {nullptr, 0};
 }
 

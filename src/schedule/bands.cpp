@@ -21,10 +21,9 @@ long long neighbours_of_regression(const kernel::PassParameters& pass) {
   return side * side * (pass.deviation > 0 ? REGRESSION_ROUNDS : NORMAL_ROUNDS);
 }
 
-/// Of a pixel, for which a grid of this radius and step votes, in samples.
-long long work_of_voters(long long radius, long long step) {
-  const long long voters = 2 * radius / step + 1;
-  return samples_of_voter * voters * voters;
+/// Of a pixel, for which a grid of this radius and these steps votes, in samples.
+long long work_of_voters(long long radius, long long step, long long row_step) {
+  return samples_of_voter * (2 * radius / step + 1) * (2 * radius / row_step + 1);
 }
 
 /// Of a dispatch, in samples; a kernel without patches may still look at every pixel's window.
@@ -35,9 +34,11 @@ long long estimated_work(const Dispatch& dispatch, const KernelConstants& consta
     case Kernel::regress:
       return samples_of_neighbour * neighbours_of_regression(dispatch.pass) * dispatch.pixels;
     case Kernel::vote:
-      return dispatch.samples + work_of_voters(dispatch.pass.radius, VOTE_STEP) * dispatch.pixels;
+      return dispatch.samples +
+             work_of_voters(dispatch.pass.radius, VOTE_STEP, VOTE_ROW_STEP) * dispatch.pixels;
     case Kernel::vote_normal:
-      return work_of_voters(NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP) * dispatch.pixels;
+      return work_of_voters(NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP, NORMAL_VOTE_STEP) *
+             dispatch.pixels;
     case Kernel::check:
       return dispatch.samples + of_windows;
     default:

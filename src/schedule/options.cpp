@@ -57,7 +57,11 @@ Options Options::preset_named(const std::string& name) {
   options.pattern = PatchPattern::checkerboard;
   if (name == "fast") {
     options.sweep_steps = 16;
+    options.window_radius = 3;
     options.source_planes = false;
+    options.coarse_planes = 2;
+    options.alternate_strips = true;
+    options.regression_steps = 3;
     return options;
   }
   if (name == "quality") {
@@ -90,6 +94,7 @@ void validate(const Options& o) {
   require_between(o.weight_scale, 0, 10000, "weight scale");
   require_between(o.levels, 1, 4, "levels");
   require_between(o.sweep_steps, 1, 10000, "sweep steps");
+  require_between(o.coarse_planes, 1, 4, "coarse planes");
   for (const auto& [values, name] : {std::pair(&o.level_iterations, "level iterations"),
                                      std::pair(&o.level_regressions, "level regressions")}) {
     if (static_cast<int>(values->size()) != o.levels) {
@@ -151,6 +156,8 @@ std::string to_json(const Options& o) {
                                        {"step_pixels", o.step_pixels},
                                        {"step_normal", o.step_normal},
                                        {"source_planes", o.source_planes},
+                                       {"coarse_planes", o.coarse_planes},
+                                       {"alternate_strips", o.alternate_strips},
                                        {"warp", o.warp},
                                        {"sampling", o.sampling},
                                        {"propagation", o.propagation},

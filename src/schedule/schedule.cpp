@@ -88,6 +88,7 @@ std::vector<View> pyramid(const Rig& rig, int levels) {
 // Candidates of shaders/adaptive_search.glsl.
 constexpr std::array<unsigned, 2> near_strips = {1u << STRIP_UP | 1u << STRIP_LEFT,
                                                  1u << STRIP_DOWN | 1u << STRIP_RIGHT};
+constexpr unsigned near_strips_of_all_sides = near_strips[0] | near_strips[1];
 constexpr unsigned strips = (1u << STRIPS) - 1;
 constexpr unsigned inverse_distance = 1u << CANDIDATE_INVERSE_DISTANCE;
 constexpr unsigned normal = 1u << CANDIDATE_NORMAL;
@@ -198,12 +199,12 @@ class Builder {
       if (level == levels_ - 1) {
         sweep(level);
       } else {
-        add_between_levels(Kernel::upsample, level, level + 1, 4);
+        add_between_levels(Kernel::upsample, level, level + 1, options_.coarse_planes);
       }
       const int place = levels_ - 1 - level;
       for (int i = 0; i < options_.level_iterations[place]; ++i) {
         const bool last = level == 0 && i + 1 == options_.level_iterations[place];
-        const unsigned candidates = cold_candidates(level == levels_ - 1, i == 0, last);
+        const unsigned candidates = cold_candidates(level == levels_ - 1, i, last);
         search(level, i, {candidates, candidates});
       }
       for (int i = 0; i < options_.level_regressions[place]; ++i) {
@@ -312,14 +313,13 @@ class Builder {
     add(Kernel::transfer_keep, pass, view, 0);
   }
 
-  /// Little more than what corrects planes that are nearly right: the near strips, half of them for
-  /// each colour, carry surfaces into what has come into view, perturbations of distance follow
-  /// what moved, and random distances find what has come near; the regression then averages, and
-  /// finds the normals.
+  /// Little more than what corrects planes that are nearly right, half of it for each colour: the
+  /// near strips carry surfaces into what has come into view, perturbations of distance follow what
+  /// moved, and random distances find what has come near; the regression then averages, and finds
+  /// the normals.
   void search_warm() {
-    constexpr unsigned perturbations = inverse_distance | random_distance;
     for (int i = 0; i < options_.warm_iterations; ++i) {
-      search(0, i, {near_strips[0] | perturbations, near_strips[1] | perturbations});
+      search(0, i, {near_strips[0] | inverse_distance, near_strips[1] | random_distance});
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
@@ -353,6 +353,7 @@ class Builder {
   void add_between_levels(Kernel kernel, int level, int from, int patches) {
     kernel::PassParameters pass = pass_of(views_of(level));
     pass.other = views_of(from).first;
+    pass.places = patches;
     add(kernel, pass, views_of(level), patches);
   }
 
@@ -362,9 +363,13 @@ class Builder {
     add(Kernel::sweep, pass, views_of(level), options_.sweep_steps);
   }
 
-  /// `first`: of the level; `last`: of all.
-  unsigned cold_candidates(bool coarsest, bool first, bool last) const {
+  /// `iteration`: of the level; `last`: of all.
+  unsigned cold_candidates(bool coarsest, int iteration, bool last) const {
     unsigned candidates = strips;
+    // Far planes first, which then spread.
+    if (options_.alternate_strips && !coarsest) {
+      candidates &= iteration % 2 == 0 ? ~near_strips_of_all_sides : near_strips_of_all_sides;
+    }
     // Presets of few samples spend those of the last iteration in the vote instead.
     if (!last || options_.pattern == PatchPattern::dense) candidates |= surroundings;
     // The last iteration spreads planes alone: the regression does what perturbations would.
@@ -374,7 +379,7 @@ class Builder {
       if (coarsest) candidates |= both;
       if (coarsest && options_.pattern == PatchPattern::dense) candidates |= normal;
     }
-    const bool first_of_all = coarsest && first;
+    const bool first_of_all = coarsest && iteration == 0;
     if (first_of_all) candidates |= random_distance;
     if (options_.source_planes && !first_of_all) candidates |= source_planes;
     return candidates;

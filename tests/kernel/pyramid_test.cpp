@@ -84,6 +84,7 @@ TEST_F(Pyramid, SweepsTheMiddlesOfEqualParts) {
 
 TEST_F(Pyramid, PlanesGoToTheFinerPixelsAround) {
   set_level(0, 1);
+  fixture_.pass().places = 4;
   const cv::Vec4f plane(0.05f, 0.1f, 0.5f, 0.1f);
   const cv::Point coarse(15, 17);
   fixture_.view(1).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
@@ -100,6 +101,28 @@ TEST_F(Pyramid, PlanesGoToTheFinerPixelsAround) {
     }
   }
   EXPECT_LT(without_plane, 10) << "of 100: most get a random one";
+}
+
+TEST_F(Pyramid, FewerPlanesAreTheOneThatHoldsThePixelAndThenTheOneAcrossTheCorner) {
+  set_level(0, 1);
+  const auto held_from = [&](cv::Point coarse, int places) {
+    const cv::Vec4f plane(0.05f, 0.1f, 0.5f, 0.1f);
+    fixture_.pass().places = places;
+    fixture_.view(1).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
+    fixture_.view(1).hypotheses(coarse) = plane;
+    const ivec2 pixel(30, 35);  // the nearest corner of (15, 17) is the one towards (14, 18)
+    kernel::cpu::upsample_pixel(fixture_.context(), pixel);
+    return fixture_.view(0).hypotheses(pixel.y, pixel.x)[2] == plane[2];
+  };
+  const cv::Point own(15, 17);
+  const cv::Point across(14, 18);
+  for (const cv::Point beside : {cv::Point(14, 17), {15, 18}}) {
+    EXPECT_TRUE(held_from(beside, 4));
+    EXPECT_FALSE(held_from(beside, 2));
+  }
+  EXPECT_TRUE(held_from(across, 2));
+  EXPECT_FALSE(held_from(across, 1));
+  EXPECT_TRUE(held_from(own, 1));
 }
 
 }  // namespace

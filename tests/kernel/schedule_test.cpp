@@ -101,6 +101,23 @@ TEST(Passes, OfTheSearchTakeBothColoursAndHalveTheirSteps) {
   }
 }
 
+TEST(Passes, OfTheSearchMayTakeFarPlanesAndNearOnesByTurns) {
+  Options options = Options::preset_named("fast");
+  for (const bool alternate : {false, true}) {
+    options.alternate_strips = alternate;
+    const auto all = passes(make_schedule(rig_of(2), options), Kernel::search);
+    ASSERT_EQ(all.size(), 3u * 2 * 2);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const bool coarsest = i < 4;
+      const bool second = i / 2 % 2 == 1;
+      EXPECT_EQ((all[i].candidates >> STRIP_UP & 1u) != 0, coarsest || !alternate || second) << i;
+      EXPECT_EQ((all[i].candidates >> (NEAR_STRIPS + STRIP_UP) & 1u) != 0,
+                coarsest || !alternate || !second)
+          << i;
+    }
+  }
+}
+
 TEST(Passes, OfAWarmSearchBringPlanesFromAllSides) {
   const auto all =
       passes(make_warm_schedule(rig_of(2), Options::preset_named("fast")), Kernel::search);
@@ -112,7 +129,7 @@ TEST(Passes, OfAWarmSearchBringPlanesFromAllSides) {
 }
 
 TEST(Passes, OfTheRegressionAskForMoreFromRoundToRound) {
-  const Options options = Options::preset_named("fast");
+  const Options options = Options::preset_named("quality");
   const auto all = passes(make_schedule(rig_of(2), options), Kernel::regress);
   const std::vector<double> shares = {1, 1, 0.6, 1, 0.6, 0.36, 0};       // at last normals alone
   const std::vector<double> tolerances = {1, 1, 1, 1, 0.6, 0.36, 0.36};  // less on the finest level

@@ -154,8 +154,8 @@ TEST(Work, OfABandGrowsWithTheVoters) {
   };
   // Each compares its plane with the pixel's own and 16 others: a difference, its scale, two
   // squares and what is added, five operations or more for each.
-  EXPECT_GE(of_vote(30) - of_vote(9), (21 * 21 - 7 * 7) * 17 * 5);
-  EXPECT_LE(of_vote(30) - of_vote(9), (21 * 21 - 7 * 7) * 17 * 20);
+  EXPECT_GE(of_vote(30) - of_vote(9), (15 * 21 - 5 * 7) * 17 * 5);
+  EXPECT_LE(of_vote(30) - of_vote(9), (15 * 21 - 5 * 7) * 17 * 20);
 }
 
 TEST(Work, OfAScheduleAddsUp) {

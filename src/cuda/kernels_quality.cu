@@ -2,8 +2,8 @@
 #include "cuda/kernels.cuh"
 
 namespace widestereo::kernel::cuda {
-KernelTable pyramid_kernels(int camera_model, int source_count) {
-  return for_rig<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 1>(
+KernelTable quality_kernels(int camera_model, int source_count) {
+  return for_rig<quality_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 1>(
       camera_model, source_count, PyramidKernels());
 }
 
