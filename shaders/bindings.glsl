@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Images are 2D arrays: of half pixels one
-// for each level, with a layer for each of its views, as texture units must clamp to them; of all else one for all
-// levels, in which coarse views share layers (src/vulkan/atlas.h).
+// for each level, with a layer for each of its views, as texture units must clamp to them; of maps one for all levels, in
+// which coarse views share layers (src/vulkan/atlas.h). Intensities lie in a buffer, for loads from images take texture
+// units, which have the samples to filter.
 //
 // Every kernel is compiled twice, for images that are read with the same bits. GPUs gather or filter four texels in one
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
@@ -26,23 +27,22 @@ layout(constant_id = 6) const int FILTER = 0;
 #endif
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
-layout(set = 0, binding = 1) uniform sampler2DArray intensity_texture;
-layout(set = 0, binding = 2, r32f) uniform image2DArray intensities;
-layout(set = 0, binding = 3, rgba32f) readonly uniform image2DArray rays;
-layout(set = 0, binding = 4, rgba32f) uniform image2DArray hypotheses;  // and, in further layers, priors and checks
-layout(set = 0, binding = 5) uniform sampler2DArray half_pixel_texture;
-layout(set = 0, binding = 6, std430) buffer NearestBlock { uint transfer_nearest[]; };
-layout(set = 0, binding = 7, std430) buffer WinnerBlock { uint transfer_winner[]; };
+layout(set = 0, binding = 1, std430) buffer IntensityBlock { float intensities[]; };
+layout(set = 0, binding = 2, rgba32f) readonly uniform image2DArray rays;
+layout(set = 0, binding = 3, rgba32f) uniform image2DArray hypotheses;  // and, in further layers, priors and checks
+layout(set = 0, binding = 4) uniform sampler2DArray half_pixel_texture;
+layout(set = 0, binding = 5, std430) buffer NearestBlock { uint transfer_nearest[]; };
+layout(set = 0, binding = 6, std430) buffer WinnerBlock { uint transfer_winner[]; };
 #ifdef TEXEL_LOADS
-layout(set = 0, binding = 8, rgba32f) uniform image2DArray half_pixels;  // with the right, lower and lower right one
+layout(set = 0, binding = 7, rgba32f) uniform image2DArray half_pixels;  // with the right, lower and lower right one
 #elif defined HALF_PRECISION
-layout(set = 0, binding = 8, r16f) uniform image2DArray half_pixels;
+layout(set = 0, binding = 7, r16f) uniform image2DArray half_pixels;
 #else
-layout(set = 0, binding = 8, r32f) uniform image2DArray half_pixels;
+layout(set = 0, binding = 7, r32f) uniform image2DArray half_pixels;
 #endif
-layout(set = 0, binding = 9, std140) uniform PlaceBlock {
+layout(set = 0, binding = 8, std140) uniform PlaceBlock {
   ivec4 map_places[MAX_VIEWS];        // x, y and layer of a view's pixel (0, 0); layers of one kind of map
-  ivec4 intensity_places[MAX_VIEWS];  // likewise
+  ivec4 intensity_places[MAX_VIEWS];  // index of a view's pixel (0, 0), and what lies between rows
 };
 layout(push_constant) uniform PassBlock {
   PassParameters pass;
@@ -63,12 +63,14 @@ ivec3 in_maps(int view, ivec2 p) { return map_place(view).xyz + ivec3(p, 0); }
 
 ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_place(view).w); }
 
-#define IntensityRow ivec3
+#define IntensityRow int
 
 IntensityRow intensity_row(int view, ivec2 p) {
   ivec4 place = view == REFERENCE ? intensity_place_of_reference : intensity_places[view];
-  return place.xyz + ivec3(p, 0);
+  return place.x + p.y * place.y + p.x;
 }
+
+float intensity_in_row(IntensityRow row, int dx) { return intensities[row + dx]; }
 
 // Views of a level follow each other, and sources are of the reference's level.
 int layer_of_half_pixels(int view) { return view - pass.first_view; }
@@ -79,13 +81,9 @@ vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, in_maps(view, p)); }
 
 #ifdef TEXEL_LOADS
 
-float intensity_in_row(IntensityRow row, int dx) { return imageLoad(intensities, row + ivec3(dx, 0, 0)).x; }
-
 vec4 half_pixel_taps(int view, ivec2 p) { return imageLoad(half_pixels, in_half_pixels(view, p)); }
 
 #else
-
-float intensity_in_row(IntensityRow row, int dx) { return texelFetch(intensity_texture, row + ivec3(dx, 0, 0), 0).x; }
 
 // Asked for once, not for each sample.
 vec2 half_pixel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
@@ -122,7 +120,7 @@ vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(vie
 void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, in_maps(view, p), h); }
 
 void store_intensity(int view, ivec2 p, float intensity) {
-  imageStore(intensities, intensity_row(view, p), vec4(intensity, 0.0f, 0.0f, 0.0f));
+  intensities[intensity_row(view, p)] = intensity;
 }
 
 vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(1, view, p)); }

@@ -47,7 +47,9 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
                        remoteness_of_voter(CONTEXT q, dx, dy, fall_off, measure.w, inverse_scale);
         vec3 normal = (1.0f / length(m)) * m;
         UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
-          support[i] += weight * max(1.0f - SUPPORT_PER_COSINE * (1.0f - dot(normal, candidates[i])), 0.0f);
+          // Not as 1 - SUPPORT_PER_COSINE (1 - cosine): Mesa would multiply out.
+          float agreement = SUPPORT_PER_COSINE * dot(normal, candidates[i]) - (SUPPORT_PER_COSINE - 1.0f);
+          support[i] += weight * max(agreement, 0.0f);
         }
       }
     }

@@ -39,7 +39,9 @@ void print_header(int runs) {
   std::printf(
       "Per depth map, on the demo scene: wall time (median [min max] of %d runs after one to warm "
       "up, transfers\n"
-      "included) and device time in ms; work counted at full windows: samples of patches a pixel, "
+      "included) and device time in ms (kernels one by one below it, as shares of their sum; CUDA "
+      "overlaps those of\n"
+      "different views otherwise); work counted at full windows: samples of patches a pixel, "
       "million samples,\n"
       "10^9 FP32 operations of patches and regressions, 10^9 source texels and 10^9 bytes of\n"
       "maps a second of device time.\n"
@@ -70,10 +72,12 @@ void print_row(const Measurement& m) {
       1e-9 * work.operations / seconds, 1e-9 * work.texels / seconds, 1e-9 * work.bytes / seconds,
       share, static_cast<double>(m.device_bytes) / (1 << 20));
   std::string shares;
+  double one_by_one = 0;
+  for (const ws::KernelTime& kernel : m.kernels) one_by_one += kernel.milliseconds;
   for (const ws::KernelTime& kernel : m.kernels) {
     char text[64];
     std::snprintf(text, sizeof text, " %s %.0f %%", kernel.kernel.c_str(),
-                  100 * kernel.milliseconds / m.on_device);
+                  100 * kernel.milliseconds / one_by_one);
     shares += text;
   }
   std::printf("           %s\n", shares.c_str());

@@ -65,14 +65,15 @@ struct KernelWork {
 struct KernelTime {
   std::string kernel;
   int dispatches = 0;
-  double milliseconds = 0;  ///< device time, summed
+  double milliseconds = 0;  ///< device time, summed; 0 where kernels are not timed
   KernelWork work = {};     ///< likewise
 };
 
 struct StereoResult {
-  std::vector<ViewResult> views;  ///< one for each view of the rig
-  std::vector<KernelTime> times;  ///< per kernel, in order of first use
-  double milliseconds = 0;        ///< wall time of match(), uploads and downloads included
+  std::vector<ViewResult> views;   ///< one for each view of the rig
+  std::vector<KernelTime> times;   ///< per kernel, in order of first use
+  double milliseconds = 0;         ///< wall time of match(), uploads and downloads included
+  double device_milliseconds = 0;  ///< of the kernels together
   long long samples = 0;         ///< patch samples of the schedule at full windows (an upper bound)
   std::size_t device_bytes = 0;  ///< memory taken on the device
   Filter filter = Filter::exact;  ///< that was used: Options::filter where the device has it
@@ -122,6 +123,12 @@ class Matcher {
   /// before. Throws Error where there are no such planes.
   StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
                           const Progress& progress = {});
+
+  /// Whether each kernel is timed (StereoResult::times), as it is unless this says otherwise. On
+  /// CUDA devices this makes them follow each other; without, and without a progress function,
+  /// those of different views may overlap, as they do in a CudaMatcher. Other devices time them in
+  /// any case.
+  void time_kernels(bool each);
 
  private:
   class Implementation;

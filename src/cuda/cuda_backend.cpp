@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cuda/launch.h"
+#include "schedule/work.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -35,10 +36,13 @@ bool same_launches(const Schedule& a, const Schedule& b) {
                     });
 }
 
-/// A graph of nodes that follow each other. It is built rather than captured: a wait for the
-/// device, in whichever thread, ends a capture.
-class Chain {
+/// A graph of launches. Those of one view follow each other; what is of all views follows, and
+/// comes before, everything. It is built rather than captured: a wait for the device, in whichever
+/// thread, ends a capture.
+class LaunchGraph {
  public:
+  explicit LaunchGraph(int views) : last_(static_cast<std::size_t>(views)) {}
+
   cudaError_t create() {
     cudaGraph_t graph = nullptr;
     const cudaError_t result = cudaGraphCreate(&graph, 0);
@@ -46,20 +50,40 @@ class Chain {
     return result;
   }
   cudaError_t add(const cudaKernelNodeParams& launch) {
-    const cudaGraphNode_t before = last_;
-    return cudaGraphAddKernelNode(&last_, graph_.get(), &before, before != nullptr ? 1 : 0,
-                                  &launch);
+    const std::vector<cudaGraphNode_t> before = last_of_all();
+    cudaGraphNode_t node = nullptr;
+    const cudaError_t result =
+        cudaGraphAddKernelNode(&node, graph_.get(), before.data(), before.size(), &launch);
+    std::fill(last_.begin(), last_.end(), node);
+    return result;
+  }
+  cudaError_t add(const cudaKernelNodeParams& launch, int view) {
+    cudaGraphNode_t& last = last_.at(static_cast<std::size_t>(view));
+    const cudaGraphNode_t before = last;
+    return cudaGraphAddKernelNode(&last, graph_.get(), &before, before != nullptr ? 1 : 0, &launch);
   }
   cudaError_t add(cudaEvent_t event) {
-    const cudaGraphNode_t before = last_;
-    return cudaGraphAddEventRecordNode(&last_, graph_.get(), &before, before != nullptr ? 1 : 0,
-                                       event);
+    const std::vector<cudaGraphNode_t> before = last_of_all();
+    cudaGraphNode_t node = nullptr;
+    const cudaError_t result =
+        cudaGraphAddEventRecordNode(&node, graph_.get(), before.data(), before.size(), event);
+    std::fill(last_.begin(), last_.end(), node);
+    return result;
   }
   cudaGraph_t get() const { return graph_.get(); }
 
  private:
+  std::vector<cudaGraphNode_t> last_of_all() const {
+    std::vector<cudaGraphNode_t> nodes;
+    for (const cudaGraphNode_t node : last_) {
+      const bool known = std::find(nodes.begin(), nodes.end(), node) != nodes.end();
+      if (node != nullptr && !known) nodes.push_back(node);
+    }
+    return nodes;
+  }
+
   CudaGraph graph_;
-  cudaGraphNode_t last_ = nullptr;
+  std::vector<cudaGraphNode_t> last_;  // of each view
 };
 
 }  // namespace
@@ -222,6 +246,15 @@ CudaBackend::Launch CudaBackend::launch_of(const Prepared& prepared, const Band&
   return launch;
 }
 
+CudaBackend::Launch CudaBackend::launch_of_view(const Prepared& prepared, const Band& band,
+                                                int view) const {
+  Launch launch = launch_of(prepared, band);
+  launch.context.pass.reference += view;
+  launch.context.pass.other += view;
+  launch.blocks.z = 1;
+  return launch;
+}
+
 void CudaBackend::launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const {
   Launch launch = launch_of(prepared, band);
   std::array<void*, 1> arguments = {&launch.context};
@@ -268,34 +301,58 @@ void CudaBackend::load_kernels(const Schedule& schedule, std::size_t events) {
   }
 }
 
-void CudaBackend::make_graph(Prepared& prepared, bool timed) {
+void CudaBackend::make_graph(Prepared& prepared, Timing timing) {
   prepared.graph.reset();
   const std::vector<Band> bands = bands_of(prepared.schedule);
-  load_kernels(prepared.schedule, timed ? bands.size() + 1 : 0);
-  Chain chain;
-  check(chain.create(), "begin a graph");
-  const auto add_kernel = [&](const Band& band) {
-    Launch launch = launch_of(prepared, band);
-    std::array<void*, 1> arguments = {&launch.context};
+  const int views = prepared.schedule.constants.source_count + 1;
+  prepared.each_is_timed = timing == Timing::of_each;
+  const std::size_t events = timing == Timing::none     ? 0
+                             : timing == Timing::of_all ? 2
+                                                        : bands.size() + 1;
+  load_kernels(prepared.schedule, events);
+  LaunchGraph graph(views);
+  check(graph.create(), "begin a graph");
+  const auto node_of = [](Launch& launch, std::array<void*, 1>& arguments) {
+    arguments = {&launch.context};
     cudaKernelNodeParams node{};
     node.func = const_cast<void*>(launch.kernel);
     node.gridDim = launch.blocks;
     node.blockDim = threads_of_block;
     node.kernelParams = arguments.data();
-    check(chain.add(node), "add a kernel to a graph");
+    return node;
+  };
+  std::array<void*, 1> arguments{};
+  const auto add_kernel = [&](const Band& band) {
+    // What one view leaves idle at the end of its launch, another one's next can use.
+    if (!prepared.each_is_timed && views_are_independent(prepared.schedule, *band.dispatch)) {
+      for (int view = 0; view < views; ++view) {
+        Launch launch = launch_of_view(prepared, band, view);
+        check(graph.add(node_of(launch, arguments), view), "add a kernel to a graph");
+      }
+      return;
+    }
+    Launch launch = launch_of(prepared, band);
+    check(graph.add(node_of(launch, arguments)), "add a kernel to a graph");
   };
   const auto add_event = [&](std::size_t i) {
-    if (timed) check(chain.add(events_.at(i).get()), "add an event to a graph");
+    check(graph.add(events_.at(i).get()), "add an event to a graph");
   };
-  prepared.stretches = in_stretches(bands, false, add_kernel, add_event);
+  if (timing == Timing::of_all) add_event(0);
+  prepared.stretches = in_stretches(bands, false, add_kernel, [&](std::size_t i) {
+    if (prepared.each_is_timed) add_event(i);
+  });
+  if (timing == Timing::of_all) add_event(1);
   cudaGraphExec_t exec = nullptr;
-  check(cudaGraphInstantiateWithFlags(&exec, chain.get(), 0), "make a graph");
+  check(cudaGraphInstantiateWithFlags(&exec, graph.get(), 0), "make a graph");
   prepared.graph.reset(exec);
 }
+
+void CudaBackend::time_kernels(bool each) { time_each_ = each; }
 
 void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
   const CurrentDevice current = make_current();
   times_.clear();
+  milliseconds_ = 0;
   set_parameters(of_run_, schedule);
   if (progress) {
     const std::vector<Band> bands = bands_of(schedule);
@@ -304,29 +361,35 @@ void CudaBackend::run(const Schedule& schedule, const Matcher::Progress& progres
     const auto record = [&](std::size_t i) {
       check(cudaEventRecord(events_.at(i).get(), stream_.get()), "record an event");
     };
-    collect(in_stretches(bands, true, launch_band, record), schedule, progress);
+    collect(in_stretches(bands, true, launch_band, record), schedule, progress, true);
   } else {
-    if (of_run_.graph == nullptr || !same_launches(of_run_.schedule, schedule)) {
+    if (of_run_.graph == nullptr || of_run_.each_is_timed != time_each_ ||
+        !same_launches(of_run_.schedule, schedule)) {
       of_run_.graph.reset();
       of_run_.schedule = schedule;
-      make_graph(of_run_, true);
+      make_graph(of_run_, time_each_ ? Timing::of_each : Timing::of_all);
     }
     check(cudaGraphLaunch(of_run_.graph.get(), stream_.get()), "launch a match");
-    collect(of_run_.stretches, schedule, progress);
+    collect(of_run_.stretches, schedule, progress, time_each_);
   }
 }
 
 void CudaBackend::collect(std::span<const Stretch> stretches, const Schedule& schedule,
-                          const Matcher::Progress& progress) {
+                          const Matcher::Progress& progress, bool each_is_timed) {
   ScheduleProgress done(schedule, progress);
   if (!progress) check(cudaStreamSynchronize(stream_.get()), "match");
-  for (std::size_t i = 0; i < stretches.size(); ++i) {
-    const Stretch& stretch = stretches[i];
+  const auto milliseconds_of = [this](std::size_t i) {
     check(cudaEventSynchronize(events_[i + 1].get()), "match");
     float milliseconds = 0;
     check(cudaEventElapsedTime(&milliseconds, events_[i].get(), events_[i + 1].get()),
           "read the time");
-    times_.add(stretch.kernel, stretch.dispatches, static_cast<double>(milliseconds));
+    milliseconds_ += static_cast<double>(milliseconds);
+    return static_cast<double>(milliseconds);
+  };
+  if (!each_is_timed) milliseconds_of(0);
+  for (std::size_t i = 0; i < stretches.size(); ++i) {
+    const Stretch& stretch = stretches[i];
+    times_.add(stretch.kernel, stretch.dispatches, each_is_timed ? milliseconds_of(i) : 0);
     done.advance(stretch.samples);
   }
 }
@@ -337,7 +400,7 @@ std::size_t CudaBackend::prepare(const Schedule& schedule) {
   prepared.schedule = schedule;
   prepared.parameters = make_parameters();
   set_parameters(prepared, schedule);
-  make_graph(prepared, false);
+  make_graph(prepared, Timing::none);
   // Or the first launch would, and might allocate for it.
   check(cudaGraphUpload(prepared.graph.get(), stream_.get()), "prepare a match");
   check(cudaStreamSynchronize(stream_.get()), "prepare a match");

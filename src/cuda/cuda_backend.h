@@ -26,12 +26,15 @@ class CudaBackend final : public Backend {
   void set_rays(int view, const cv::Mat& rays) override;
   void set_intensity(int view, const cv::Mat& intensity) override;
   /// Without a progress function the schedule is launched as one graph, which is kept for further
-  /// runs of the same schedule; with one, kernel by kernel. Neither waits between kernels.
+  /// runs of the same schedule; with one, kernel by kernel. Neither waits between kernels. Kernels
+  /// of different views overlap in graphs unless each is timed.
   void run(const Schedule& schedule, const Matcher::Progress& progress) override;
   cv::Mat hypotheses(int view) override;
   void set_hypotheses(int view, const cv::Mat& hypotheses) override;
   cv::Mat checks(int view) override;
   std::vector<KernelTime> times() const override { return times_.list(); }
+  void time_kernels(bool each) override;
+  double device_milliseconds() const override { return milliseconds_; }
   std::size_t device_bytes() const override;
 
   /// Makes a schedule ready for enqueue(), with parameters of its own; waits. Returns its number.
@@ -69,6 +72,7 @@ class CudaBackend final : public Backend {
     DeviceArray<kernel::MatchParameters> parameters;
     CudaGraphExec graph;
     std::vector<Stretch> stretches;  // of the graph
+    bool each_is_timed = false;      // kernels then follow each other
   };
 
   CurrentDevice make_current() const { return CurrentDevice(target_.ordinal, target_.name); }
@@ -88,12 +92,15 @@ class CudaBackend final : public Backend {
   std::vector<Stretch> in_stretches(std::span<const Band> bands, bool each_band,
                                     const OnBand& on_band, const OnEvent& on_event) const;
   Launch launch_of(const Prepared& prepared, const Band& band) const;
+  /// The same for one view of the dispatch.
+  Launch launch_of_view(const Prepared& prepared, const Band& band, int view) const;
   void launch(const Prepared& prepared, const Band& band, cudaStream_t stream) const;
-  /// `timed`: with events between kernels.
-  void make_graph(Prepared& prepared, bool timed);
+  /// Events that a graph records: none, around all kernels, or between them as well.
+  enum class Timing { none, of_all, of_each };
+  void make_graph(Prepared& prepared, Timing timing);
   /// Waits for a run and notes its times.
   void collect(std::span<const Stretch> stretches, const Schedule& schedule,
-               const Matcher::Progress& progress);
+               const Matcher::Progress& progress, bool each_is_timed);
 
   CudaTarget target_;
   std::vector<cv::Size> sizes_;
@@ -106,7 +113,9 @@ class CudaBackend final : public Backend {
   std::vector<CudaEvent> events_;
   Prepared of_run_;  // the last schedule of run()
   std::vector<Prepared> prepared_;
+  bool time_each_ = true;
   KernelTimes times_;
+  double milliseconds_ = 0;  // of the last run
 };
 
 }  // namespace widestereo

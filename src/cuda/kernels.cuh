@@ -153,10 +153,14 @@ struct Algorithm {
 
 // Blocks that a multiprocessor must be able to hold: with more ptxas spills registers, without a
 // bound it does so as well or takes so many that a block fewer fits (tools/cuda_kernel_report).
+// Measured on an H100 (docs/performance.md).
 template <class C>
 constexpr int least_blocks(std::string_view kernel) {
   if (C::camera_model < 0) return 4;
-  return kernel == "vote" ? 6 : 5;  // more warps hide what it loads
+  if (kernel == "regress" || kernel == "vote_normal") return 5;
+  const bool few_registers = C::window_radius == fast_window_radius || C::warp == WARP_AFFINE;
+  if (C::window_radius == quality_window_radius) return kernel == "vote" ? 6 : 5;
+  return few_registers ? 8 : 5;
 }
 
 #define KERNEL(name, view)                                                             \

@@ -18,6 +18,12 @@ void KernelTimes::add(Kernel kernel, int dispatches, double milliseconds) {
   entry->milliseconds += milliseconds;
 }
 
+double Backend::device_milliseconds() const {
+  double sum = 0;
+  for (const KernelTime& time : times()) sum += time.milliseconds;
+  return sum;
+}
+
 ScheduleProgress::ScheduleProgress(const Schedule& schedule, const Matcher::Progress& progress)
     : progress_(progress) {
   for (const Dispatch& dispatch : schedule.dispatches) total_ += dispatch.samples;

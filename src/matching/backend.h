@@ -70,6 +70,10 @@ class Backend {
   virtual cv::Mat checks(int view) = 0;
   /// Device time per kernel of the last run.
   virtual std::vector<KernelTime> times() const = 0;
+  /// See Matcher::time_kernels().
+  virtual void time_kernels(bool) {}
+  /// Device time of the last run.
+  virtual double device_milliseconds() const;
   virtual std::size_t device_bytes() const = 0;
 };
 

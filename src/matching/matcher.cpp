@@ -113,6 +113,8 @@ class Matcher::Implementation {
     return run(setup_.warm_schedule, images, progress, start.hypotheses);
   }
 
+  void time_kernels(bool each) { backend_->time_kernels(each); }
+
  private:
   /// `hypotheses`: planes to upload, one map for each view, or none.
   StereoResult run(const Schedule& schedule, const std::vector<cv::Mat>& images,
@@ -147,6 +149,7 @@ class Matcher::Implementation {
     for (const Dispatch& dispatch : schedule.dispatches) result.samples += dispatch.samples;
     result.times = backend_->times();
     add_work(result.times, schedule);
+    result.device_milliseconds = backend_->device_milliseconds();
     result.device_bytes = backend_->device_bytes();
     result.filter = static_cast<Filter>(schedule.constants.filter);
     result.milliseconds =
@@ -181,5 +184,7 @@ StereoResult Matcher::match_next(const std::vector<cv::Mat>& images, const WarmS
                                  const Progress& progress) {
   return implementation_->match_next(images, start, progress);
 }
+
+void Matcher::time_kernels(bool each) { implementation_->time_kernels(each); }
 
 }  // namespace widestereo

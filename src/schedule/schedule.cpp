@@ -313,13 +313,13 @@ class Builder {
     add(Kernel::transfer_keep, pass, view, 0);
   }
 
-  /// Little more than what corrects planes that are nearly right, half of it for each colour: the
-  /// near strips carry surfaces into what has come into view, perturbations of distance follow what
-  /// moved, and random distances find what has come near; the regression then averages, and finds
-  /// the normals.
+  /// Little more than what corrects planes that are nearly right: the near strips, half of them for
+  /// each colour, carry surfaces into what has come into view; perturbations of distance follow
+  /// what moved, and random distances find what has come near, for one colour, from which the other
+  /// one takes them; the regression then averages, and finds the normals.
   void search_warm() {
     for (int i = 0; i < options_.warm_iterations; ++i) {
-      search(0, i, {near_strips[0] | inverse_distance, near_strips[1] | random_distance});
+      search(0, i, {near_strips[0] | inverse_distance | random_distance, near_strips[1]});
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
@@ -433,7 +433,7 @@ class Builder {
 
   /// Planes that were regressed in the frame before need fewer neighbours.
   int warm_regression_steps() const {
-    constexpr int fewest = 3;
+    constexpr int fewest = 2;
     return std::max(std::min(options_.regression_steps, fewest), options_.regression_steps / 2);
   }
 

@@ -226,4 +226,11 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
                              sources * bytes(traffic.read_in_sources))};
 }
 
+bool views_are_independent(const Schedule& schedule, const Dispatch& dispatch) {
+  const int views_of_level = schedule.constants.source_count + 1;
+  const Traffic traffic = traffic_of(dispatch);
+  return dispatch.views == views_of_level && (traffic.read_in_sources & plane) == 0 &&
+         (traffic.written & half_pixels) == 0;
+}
+
 }  // namespace widestereo

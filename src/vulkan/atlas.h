@@ -17,7 +17,6 @@ struct Atlas {
   std::vector<Place> places;  ///< one for each view
 };
 
-/// `apron`: pixels of a view's own all around it, in front of its origin, too.
-Atlas pack_views(const std::vector<cv::Size>& sizes, int apron);
+Atlas pack_views(const std::vector<cv::Size>& sizes);
 
 }  // namespace widestereo

@@ -76,6 +76,8 @@ namespace widestereo {
   X(vkCmdDispatch)                                \
   X(vkCmdPipelineBarrier)                         \
   X(vkCmdUpdateBuffer)                            \
+  X(vkCmdCopyBuffer)                              \
+  X(vkCmdFillBuffer)                              \
   X(vkCmdClearColorImage)                         \
   X(vkCmdCopyBufferToImage)                       \
   X(vkCmdCopyImageToBuffer)                       \

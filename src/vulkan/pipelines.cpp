@@ -104,8 +104,7 @@ void Pipelines::make_layouts(const VulkanContext& context) {
   };
   const std::array bindings = {
       binding(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
-      binding(binding_intensity_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
-      binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_half_pixel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),

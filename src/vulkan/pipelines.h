@@ -13,15 +13,14 @@ namespace widestereo {
 /// Bindings of shaders/bindings.glsl.
 enum Binding : std::uint32_t {
   binding_parameters = 0,
-  binding_intensity_texture = 1,
-  binding_intensities = 2,
-  binding_rays = 3,
-  binding_hypotheses = 4,
-  binding_half_pixel_texture = 5,
-  binding_nearest = 6,
-  binding_winner = 7,
-  binding_half_pixels = 8,
-  binding_places = 9,
+  binding_intensities = 1,
+  binding_rays = 2,
+  binding_hypotheses = 3,
+  binding_half_pixel_texture = 4,
+  binding_nearest = 5,
+  binding_winner = 6,
+  binding_half_pixels = 7,
+  binding_places = 8,
 };
 
 /// How many cover so many pixels of a row or a column.
@@ -43,8 +42,8 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 /// specialised for constants; all share one descriptor set layout.
 class Pipelines {
  public:
-  /// `sampled`: intensities are read through the texture units instead of as storage images, which
-  /// hold half pixels in another format (shaders/bindings.glsl). Those that texture units filter
+  /// `sampled`: half pixels are read through the texture units instead of as storage images, which
+  /// hold them in another format (shaders/bindings.glsl). Those that texture units filter
   /// have half precision where the device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);

@@ -2,6 +2,7 @@
 #include "vulkan/vulkan_backend.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
 #include <limits>
 
@@ -123,8 +124,7 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
                                           : default_max_samples(context.properties().deviceType)),
       pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
                                 cache.get())),
-      map_atlas_(pack_views(sizes, 0)),
-      intensity_atlas_(pack_views(sizes, APRON)),
+      map_atlas_(pack_views(sizes)),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
       sampler_(make_sampler(context)),
       command_pool_(make_command_pool(context)) {
@@ -147,15 +147,16 @@ void VulkanBackend::make_images(const VulkanContext& context) {
                           VK_IMAGE_USAGE_TRANSFER_DST_BIT,
                       purpose);
   };
-  const auto make_intensities = [&](VkFormat format, cv::Size with_rim, int layers,
-                                    const char* purpose) {
-    return make_image(
-        context, format, with_rim, layers,
-        VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-        purpose);
-  };
-  intensities_ = make_intensities(intensity_format, intensity_atlas_.size, intensity_atlas_.layers,
-                                  "the images");
+  VkDeviceSize count = 0;
+  for (const cv::Size& size : sizes_) {
+    const cv::Size whole = with_apron(size);
+    const VkDeviceSize first = count + static_cast<VkDeviceSize>(APRON * whole.width + APRON);
+    intensity_places_.push_back({static_cast<int>(first), whole.width});
+    count += static_cast<VkDeviceSize>(whole.width) * static_cast<VkDeviceSize>(whole.height);
+  }
+  intensities_ = make_device_buffer(
+      context, count * sizeof(float),
+      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the images");
   const VkFormat format_of_half_pixels = pipelines_.half_precision()
                                              ? format_of_filtered_half_pixels
                                          : pipelines_.sampled() ? intensity_format
@@ -163,9 +164,11 @@ void VulkanBackend::make_images(const VulkanContext& context) {
   const std::span<const cv::Size> sizes = sizes_;
   const auto views = static_cast<std::size_t>(views_of_level());
   for (std::size_t first = 0; first < sizes.size(); first += views) {
-    half_pixels_.push_back(make_intensities(
-        format_of_half_pixels, size_of_half_pixels(largest(sizes.subspan(first, views))),
-        views_of_level(), "the images at half pixels"));
+    half_pixels_.push_back(make_image(
+        context, format_of_half_pixels, size_of_half_pixels(largest(sizes.subspan(first, views))),
+        views_of_level(),
+        VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
+        "the images at half pixels"));
   }
   rays_ = make_map(1, "the viewing rays");
   hypotheses_ = make_map(map_kinds, "the planes, their priors and the consistency maps");
@@ -185,9 +188,9 @@ void VulkanBackend::make_descriptor_sets() {
   const auto levels = static_cast<std::uint32_t>(half_pixels_.size());
   const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * levels},
-      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2 * levels},
-      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4 * levels},
-      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * levels},
+      {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, levels},
+      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 3 * levels},
+      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 3 * levels},
   }};
   descriptor_pool_ = make_descriptor_pool(context_, levels, pool_sizes);
   for (const LayeredImage& half_pixels : half_pixels_) {
@@ -216,19 +219,17 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& half_pixe
   const auto buffer_info = [](const Buffer& buffer) {
     return VkDescriptorBufferInfo{buffer.handle.get(), 0, VK_WHOLE_SIZE};
   };
-  const VkDescriptorImageInfo intensities = image_info(intensities_, sampler_.get());
   const VkDescriptorImageInfo rays = image_info(rays_, VK_NULL_HANDLE);
   const VkDescriptorImageInfo hypotheses = image_info(hypotheses_, VK_NULL_HANDLE);
   const VkDescriptorImageInfo half_pixels = image_info(half_pixels_of_level, sampler_.get());
+  const VkDescriptorBufferInfo intensities = buffer_info(intensities_);
   const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
   const VkDescriptorBufferInfo places = buffer_info(places_);
   const VkDescriptorBufferInfo nearest = buffer_info(transfer_nearest_);
   const VkDescriptorBufferInfo winner = buffer_info(transfer_winner_);
   write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
   write(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &places);
-  write(binding_intensity_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &intensities,
-        nullptr);
-  write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &intensities, nullptr);
+  write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &intensities);
   write(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &rays, nullptr);
   write(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &hypotheses, nullptr);
   write(binding_half_pixel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &half_pixels,
@@ -257,7 +258,8 @@ void VulkanBackend::start_memory() {
   };
   VkClearColorValue masked{};
   std::fill_n(masked.float32, 4, MASKED_INTENSITY);
-  clear(intensities_, masked);
+  context_.vk().vkCmdFillBuffer(commands, intensities_.handle.get(), 0, VK_WHOLE_SIZE,
+                                std::bit_cast<std::uint32_t>(MASKED_INTENSITY));
   if (pipelines_.half_precision()) std::fill_n(masked.float32, 4, LOWEST_HALF);
   for (const LayeredImage& half_pixels : half_pixels_) clear(half_pixels, masked);
   clear(rays_, {});
@@ -265,12 +267,9 @@ void VulkanBackend::start_memory() {
 
   PlaceBlock block;
   for (std::size_t view = 0; view < sizes_.size(); ++view) {
-    const auto place_in = [view](const Atlas& atlas) {
-      const Atlas::Place& place = atlas.places[view];
-      return std::array{place.origin.x, place.origin.y, place.layer, atlas.layers};
-    };
-    block.maps[view] = place_in(map_atlas_);
-    block.intensities[view] = place_in(intensity_atlas_);
+    const Atlas::Place& place = map_atlas_.places[view];
+    block.maps[view] = {place.origin.x, place.origin.y, place.layer, map_atlas_.layers};
+    block.intensities[view] = {intensity_places_[view].first, intensity_places_[view].stride, 0, 0};
   }
   context_.vk().vkCmdUpdateBuffer(commands, places_.handle.get(), 0, sizeof block, &block);
   submissions_[0]->submit();
@@ -305,12 +304,11 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stage
                                      nullptr, 0, nullptr);
 }
 
-void VulkanBackend::upload(const LayeredImage& image, const Atlas& atlas, int view,
-                           const cv::Mat& map, int type) {
+void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
-  require_map(map, view, size, type);
-  map.copyTo(cv::Mat(size, type, staging_.mapped));
-  const Atlas::Place& place = atlas.places[static_cast<std::size_t>(view)];
+  require_map(map, view, size, CV_32FC4);
+  map.copyTo(cv::Mat(size, CV_32FC4, staging_.mapped));
+  const Atlas::Place& place = map_atlas_.places[static_cast<std::size_t>(view)];
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layer_range(place.layer, 1);
   const VkBufferImageCopy region = region_of(place, size);
@@ -342,24 +340,37 @@ cv::Mat VulkanBackend::download(MapKind kind, int view) {
   return cv::Mat(size, CV_32FC4, staging_.mapped).clone();
 }
 
-void VulkanBackend::set_rays(int view, const cv::Mat& rays) {
-  upload(rays_, map_atlas_, view, rays, CV_32FC4);
-}
+void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view, rays); }
 void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
-  upload(intensities_, intensity_atlas_, view, intensity, CV_32FC1);
+  const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
+  require_map(intensity, view, size, CV_32FC1);
+  intensity.copyTo(cv::Mat(size, CV_32FC1, staging_.mapped));
+  const IntensityPlace& place = intensity_places_[static_cast<std::size_t>(view)];
+  const VkDeviceSize row = static_cast<VkDeviceSize>(size.width) * sizeof(float);
+  std::vector<VkBufferCopy> rows;
+  for (int y = 0; y < size.height; ++y) {
+    rows.push_back({static_cast<VkDeviceSize>(y) * row,
+                    static_cast<VkDeviceSize>(place.first + y * place.stride) * sizeof(float),
+                    row});
+  }
+  const VkCommandBuffer commands = submissions_[0]->begin();
+  context_.vk().vkCmdCopyBuffer(commands, staging_.handle.get(), intensities_.handle.get(),
+                                static_cast<std::uint32_t>(rows.size()), rows.data());
+  submissions_[0]->submit();
+  submissions_[0]->wait();
 }
 void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
-  upload(hypotheses_, map_atlas_, view, hypotheses, CV_32FC4);
+  upload(hypotheses_, view, hypotheses);
 }
 cv::Mat VulkanBackend::hypotheses(int view) { return download(planes, view); }
 cv::Mat VulkanBackend::checks(int view) { return download(checks_of_planes, view); }
 
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;
-  for (const LayeredImage* image : {&intensities_, &rays_, &hypotheses_}) bytes += image->bytes;
+  for (const LayeredImage* image : {&rays_, &hypotheses_}) bytes += image->bytes;
   for (const LayeredImage& half_pixels : half_pixels_) bytes += half_pixels.bytes;
   for (const Buffer* buffer :
-       {&parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
+       {&intensities_, &parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
     bytes += buffer->bytes;
   }
   return static_cast<std::size_t>(bytes);

@@ -21,7 +21,7 @@ namespace widestereo {
 struct VulkanTuning {
   /// Longest dispatch and submission in patch samples, 0 = by device type.
   long long max_samples = 0;
-  /// Reads intensities through the texture units; unset: everywhere but on CPUs. Without, filtering
+  /// Reads half pixels through the texture units; unset: everywhere but on CPUs. Without, filtering
   /// is exact, and half pixels take four times the memory.
   std::optional<bool> sampled = std::nullopt;
 };
@@ -65,6 +65,11 @@ class VulkanBackend final : public Backend {
   struct Run;  // of run(): what is in flight
   /// What hypotheses_ holds behind each other, by its numbers in shaders/bindings.glsl.
   enum MapKind : int { planes, priors, checks_of_planes, map_kinds };
+  /// Where a view's intensities lie, which an apron surrounds.
+  struct IntensityPlace {
+    int first = 0;   ///< number of pixel (0, 0) in the buffer
+    int stride = 0;  ///< from row to row
+  };
 
   void make_images(const VulkanContext& context);
   void make_descriptor_sets();
@@ -75,19 +80,18 @@ class VulkanBackend final : public Backend {
                   VkImageLayout to) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
-  void upload(const LayeredImage& image, const Atlas& atlas, int view, const cv::Mat& map,
-              int type);
+  void upload(const LayeredImage& image, int view, const cv::Mat& map);
   cv::Mat download(MapKind kind, int view);
   int views_of_level() const { return constants_.source_count + 1; }
 
   const VulkanContext& context_;
   std::vector<cv::Size> sizes_;
+  std::vector<IntensityPlace> intensity_places_;
   KernelConstants constants_;
   long long max_samples_;
   Pipelines pipelines_;
   Atlas map_atlas_;
-  Atlas intensity_atlas_;
-  LayeredImage intensities_;
+  Buffer intensities_;
   LayeredImage rays_;
   std::vector<LayeredImage> half_pixels_;  // of each level
   LayeredImage hypotheses_;                // of each MapKind

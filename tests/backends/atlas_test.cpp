@@ -19,16 +19,15 @@ std::vector<cv::Size> pyramid_of(cv::Size finest, int count, int levels) {
   return sizes;
 }
 
-/// Each view with its apron lies inside its layer, apart from all others.
-void expect_apart(const std::vector<cv::Size>& sizes, int apron) {
-  const Atlas atlas = pack_views(sizes, apron);
+/// Each view lies inside its layer, apart from all others.
+void expect_apart(const std::vector<cv::Size>& sizes) {
+  const Atlas atlas = pack_views(sizes);
   ASSERT_EQ(atlas.places.size(), sizes.size());
   std::vector<cv::Mat_<int>> taken;
   for (int i = 0; i < atlas.layers; ++i) taken.emplace_back(atlas.size, 0);
   for (std::size_t view = 0; view < sizes.size(); ++view) {
     const Atlas::Place& place = atlas.places[view];
-    const cv::Rect area(place.origin - cv::Point(apron, apron),
-                        sizes[view] + cv::Size(2 * apron, 2 * apron));
+    const cv::Rect area(place.origin, sizes[view]);
     ASSERT_EQ(area & cv::Rect({0, 0}, atlas.size), area) << view;
     cv::Mat part = taken.at(static_cast<std::size_t>(place.layer))(area);
     EXPECT_EQ(cv::countNonZero(part), 0) << view;
@@ -38,7 +37,7 @@ void expect_apart(const std::vector<cv::Size>& sizes, int apron) {
 
 TEST(Atlas, CoarseLevelsShareLayers) {
   const auto layers = [](int views, int levels) {
-    return pack_views(pyramid_of({512, 512}, views, levels), 0).layers;
+    return pack_views(pyramid_of({512, 512}, views, levels)).layers;
   };
   EXPECT_EQ(layers(2, 1), 2);
   EXPECT_EQ(layers(2, 3), 2 + 1);
@@ -47,17 +46,15 @@ TEST(Atlas, CoarseLevelsShareLayers) {
   EXPECT_EQ(layers(4, 4), 4 + 2);
 }
 
-TEST(Atlas, OddSidesAndApronsFitAsWell) {
+TEST(Atlas, OddSidesFitAsWell) {
   for (const cv::Size size : {cv::Size(512, 512), cv::Size(641, 477), cv::Size(33, 1025)}) {
-    EXPECT_EQ(pack_views(pyramid_of(size, 2, 3), 0).layers, 3) << size;
-    EXPECT_LE(pack_views(pyramid_of(size, 2, 3), 16).layers, 3) << size;
+    EXPECT_EQ(pack_views(pyramid_of(size, 2, 3)).layers, 3) << size;
   }
 }
 
 TEST(Atlas, LayersAreNoLargerThanNeeded) {
-  EXPECT_EQ(pack_views(pyramid_of({641, 477}, 2, 1), 0).size, cv::Size(641, 477));
-  EXPECT_EQ(pack_views(pyramid_of({641, 477}, 2, 1), 16).size, cv::Size(641 + 32, 477 + 32));
-  EXPECT_EQ(pack_views(pyramid_of({512, 512}, 2, 3), 0).size, cv::Size(512, 512));
+  EXPECT_EQ(pack_views(pyramid_of({641, 477}, 2, 1)).size, cv::Size(641, 477));
+  EXPECT_EQ(pack_views(pyramid_of({512, 512}, 2, 3)).size, cv::Size(512, 512));
 }
 
 TEST(Atlas, ViewsOfAnySizesLieApart) {
@@ -67,10 +64,9 @@ TEST(Atlas, ViewsOfAnySizesLieApart) {
   for (int i = 0; i < 50; ++i) {
     std::vector<cv::Size> sizes(static_cast<std::size_t>(count(random)));
     for (cv::Size& size : sizes) size = {side(random), side(random)};
-    expect_apart(sizes, 0);
-    expect_apart(sizes, 16);
+    expect_apart(sizes);
   }
-  expect_apart(pyramid_of({641, 477}, 5, 3), 16);
+  expect_apart(pyramid_of({641, 477}, 5, 3));
 }
 
 }  // namespace

@@ -91,6 +91,13 @@ TEST(CudaMatch, TimesEveryKernelInBothWaysAndTurns) {
       EXPECT_LT(total, result->milliseconds);
     }
     EXPECT_GT(graph.device_bytes, 128u * 128u * 2u * 68u);
+    matcher.time_kernels(false);
+    const StereoResult untimed = matcher.match(images_of(pair));
+    expect_same(untimed, graph);
+    EXPECT_GT(untimed.device_milliseconds, 0);
+    EXPECT_LT(untimed.device_milliseconds, untimed.milliseconds);
+    ASSERT_EQ(untimed.times.size(), graph.times.size());
+    for (const KernelTime& time : untimed.times) EXPECT_EQ(time.milliseconds, 0) << time.kernel;
   }
 }
 

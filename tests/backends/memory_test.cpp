@@ -49,19 +49,17 @@ double documented_bytes(const DeviceInfo& device, int levels, double bytes_of_ti
   for (int level = 0; level < levels; ++level) {
     const double own = side / (1 << level);
     const double half_pixels = 2 * own + 2 * 32;
+    bytes += 2 * bytes_of_rows(own + 2 * 16, bytes_of_intensity);
     if (levels_share_layers) {
       bytes += 2 * bytes_of_image(half_pixels, half_pixels, bytes_of_half_pixel, bytes_of_tile);
     } else {
       bytes += 2 * bytes_of_rows(half_pixels, bytes_of_half_pixel);
-      bytes += 2 * bytes_of_rows(own + 2 * 16, bytes_of_intensity);
       bytes += 2 * own * own * maps * bytes_of_map;
     }
   }
   if (levels_share_layers) {
-    const double layers = levels == 1 ? 2 : 3;                         // one for all that is coarse
-    const double width = levels == 1 ? side + 2 * 16 : side + 4 * 16;  // two half as wide
+    const double layers = levels == 1 ? 2 : 3;  // one for all that is coarse
     bytes += layers * maps * bytes_of_image(side, side, bytes_of_map, bytes_of_tile);
-    bytes += layers * bytes_of_image(width, side + 2 * 16, bytes_of_intensity, bytes_of_tile);
   }
   return bytes;
 }

@@ -22,9 +22,9 @@ __thread dim3 threadIdx;
 
 struct CUgraphNode_st {
   Work work;
-  CUevent_st* event = nullptr;  // which it records
+  CUevent_st* event = nullptr;      // which it records
+  std::vector<std::size_t> before;  // numbers of the nodes that it follows
 };
-/// A chain: each node follows the one before.
 struct CUgraph_st {
   std::deque<CUgraphNode_st> nodes;
 };
@@ -119,7 +119,10 @@ cudaError_t step_on(cudaStream_t stream) {
 void enqueue(cudaStream_t stream, Work work) {
   CUstream_st* target = resolve(stream);
   if (target->capturing != nullptr) {
-    target->capturing->nodes.push_back({std::move(work)});
+    CUgraph_st& graph = *target->capturing;
+    std::vector<std::size_t> before;
+    if (!graph.nodes.empty()) before.push_back(graph.nodes.size() - 1);
+    graph.nodes.push_back({std::move(work), nullptr, before});
   } else {
     target->queue.push_back(std::move(work));
   }
@@ -181,10 +184,36 @@ void await_record(CUevent_st& event, cudaStream_t stream) {
   event.recorded = false;
 }
 
-/// Whether a new node's predecessor is the graph's last one.
-bool follows(const CUgraph_st& graph, const cudaGraphNode_t* before, std::size_t count) {
-  if (graph.nodes.empty()) return count == 0;
-  return count == 1 && *before == &graph.nodes.back();
+/// Numbers of a new node's predecessors; false where one is named twice or is not of the graph.
+bool find_nodes(const CUgraph_st& graph, const cudaGraphNode_t* before, std::size_t count,
+                std::vector<std::size_t>& numbers) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto node = std::find_if(graph.nodes.begin(), graph.nodes.end(),
+                                   [&](const auto& one) { return &one == before[i]; });
+    const auto number = static_cast<std::size_t>(node - graph.nodes.begin());
+    const bool known = std::find(numbers.begin(), numbers.end(), number) != numbers.end();
+    if (node == graph.nodes.end() || known) return false;
+    numbers.push_back(number);
+  }
+  return true;
+}
+
+/// An order in which nodes may run: as they were added, or with the last one first that may run.
+std::vector<std::size_t> order_of(const std::deque<CUgraphNode_st>& nodes, bool backwards) {
+  std::vector<std::size_t> order;
+  std::vector<bool> done(nodes.size());
+  while (order.size() < nodes.size()) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const std::size_t number = backwards ? nodes.size() - 1 - i : i;
+      const std::vector<std::size_t>& before = nodes[number].before;
+      if (done[number]) continue;
+      if (!std::all_of(before.begin(), before.end(), [&](auto one) { return done[one]; })) continue;
+      done[number] = true;
+      order.push_back(number);
+      break;
+    }
+  }
+  return order;
 }
 
 }  // namespace
@@ -423,22 +452,24 @@ cudaError_t cudaGraphCreate(cudaGraph_t* graph, unsigned flags) {
 cudaError_t cudaGraphAddKernelNode(cudaGraphNode_t* node, cudaGraph_t graph,
                                    const cudaGraphNode_t* before, std::size_t count,
                                    const cudaKernelNodeParams* launch) {
-  if (!follows(*graph, before, count)) return cudaErrorInvalidValue;
+  std::vector<std::size_t> numbers;
+  if (!find_nodes(*graph, before, count, numbers)) return cudaErrorInvalidValue;
   Work work;
   if (const cudaError_t error = bind_launch(launch->func, launch->gridDim, launch->blockDim,
                                             launch->kernelParams, work)) {
     return error;
   }
-  graph->nodes.push_back({std::move(work)});
+  graph->nodes.push_back({std::move(work), nullptr, numbers});
   *node = &graph->nodes.back();
   return cudaSuccess;
 }
 cudaError_t cudaGraphAddEventRecordNode(cudaGraphNode_t* node, cudaGraph_t graph,
                                         const cudaGraphNode_t* before, std::size_t count,
                                         cudaEvent_t event) {
-  if (!follows(*graph, before, count)) return cudaErrorInvalidValue;
+  std::vector<std::size_t> numbers;
+  if (!find_nodes(*graph, before, count, numbers)) return cudaErrorInvalidValue;
   if (const cudaError_t error = step()) return error;
-  graph->nodes.push_back({record_of(event), event});
+  graph->nodes.push_back({record_of(event), event, numbers});
   *node = &graph->nodes.back();
   return cudaSuccess;
 }
@@ -459,7 +490,8 @@ cudaError_t cudaGraphUpload(cudaGraphExec_t, cudaStream_t stream) { return step_
 cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
   if (resolve(stream)->capturing != nullptr) return cudaErrorStreamCaptureUnsupported;
   if (const cudaError_t error = step()) return error;
-  for (const CUgraphNode_st& node : exec->nodes) {
+  for (const std::size_t number : order_of(exec->nodes, emulation().backwards)) {
+    const CUgraphNode_st& node = exec->nodes[number];
     if (node.event != nullptr) await_record(*node.event, stream);
     enqueue(stream, node.work);
   }

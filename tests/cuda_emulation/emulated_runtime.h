@@ -26,7 +26,9 @@ struct Emulation {
   cudaError_t failure = cudaSuccess;
   bool sticky = false;  ///< and every one after it
 
-  bool backwards = false;  ///< of each launch the last block and its last thread come first
+  /// Of each launch the last block and its last thread come first, of a graph the last node that
+  /// may.
+  bool backwards = false;
 
   long calls = 0;
   int current_device = 0;
