@@ -7,6 +7,8 @@
 #define NORMAL_CANDIDATE_REACH 3
 // Normals support each other up to 14 degrees, by their cosines.
 #define SUPPORT_PER_COSINE 33.0f
+// Cosine of half a degree: candidates that differ less from the pixel's own need no election.
+#define COSINE_OF_SAME_NORMAL 0.99996f
 
 // Stores as prior (m, 1) the plane with the pixel's distance and that normal of the candidates which most of the
 // planes around support, weighted by nearness, likeness of intensity and agreement in distance at the pixel; zero where
@@ -33,10 +35,16 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       vec3 m = vec3(plane.x, plane.y, plane.z);
       if (plane.w < INVALID_COST && dot(m, ray) > 0.0f) candidates[i] = (1.0f / length(m)) * m;
     }
+    float least_cosine = 1.0f;
+    UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
+      least_cosine = min(least_cosine, dot(candidates[i], candidates[NORMAL_CANDIDATES / 2]));
+    }
     float fall_off = 2.0f / float(NORMAL_VOTE_RADIUS * NORMAL_VOTE_RADIUS);
     float inverse_scale = PARAMETERS.support.y;
     ivec4 grid = grid_in_image(size, pixel, ivec2(-NORMAL_VOTE_RADIUS, -NORMAL_VOTE_RADIUS), NORMAL_VOTE_RADIUS,
                                ivec2(NORMAL_VOTE_STEP, NORMAL_VOTE_STEP));
+    // On most surfaces there is nothing to elect.
+    if (least_cosine > COSINE_OF_SAME_NORMAL) grid.w = grid.y - 1;
     for (int dy = grid.y; dy <= grid.w; dy += NORMAL_VOTE_STEP) {
       for (int dx = grid.x; dx <= grid.z; dx += NORMAL_VOTE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);

@@ -91,7 +91,7 @@
 // radius (pixels) that a plane is fitted to; the variance (px^2) of what was not measured.
 #define REGRESSION_ROUNDS 5
 #define WHOLE_RADIUS_ROUND 3
-#define NORMAL_ROUNDS 4
+#define NORMAL_ROUNDS 3
 #define SMALLEST_FIT_RADIUS 2
 #define UNMEASURED_VARIANCE 1e4f
 
