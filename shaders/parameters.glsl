@@ -19,8 +19,8 @@
 #define HALF_PIXEL_APRON (2 * APRON)
 
 // In a vote, the planes that stand for election besides the pixel's own (of pixels in eight directions, at half the
-// radius and at it), the step between the pixels that vote, the planes that then compete with the pixel's own, and the
-// radius of the part of the patch that compares them.
+// radius and at it), the steps between the pixels that vote in a row and between their rows, the planes that then compete
+// with the pixel's own, and the radius of the part of the patch that compares them.
 #define VOTE_CANDIDATES 16
 #define VOTE_STEP 4
 #define VOTE_ROW_STEP 3
@@ -87,7 +87,7 @@
 #define FILL_WITH_MATCHES (2u * REASON_FILLED)
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
-// before it half the next one; those for normals alone, over an eighth, twice a half, and the whole radius; the smallest
+// before it half the next one; those for normals alone, over an eighth, a half and the whole radius; the smallest
 // radius (pixels) that a plane is fitted to; the variance (px^2) of what was not measured.
 #define REGRESSION_ROUNDS 5
 #define WHOLE_RADIUS_ROUND 3
