@@ -31,8 +31,9 @@ int side_of_fit(int radius, int steps);
 /// (see KernelWork).
 KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch);
 
-/// Whether each view of a dispatch may run as soon as its own dispatches before have: it is over all
-/// views of a level, reads no planes of other views and writes no half pixels, which these read.
+/// Whether each view of a dispatch may run as soon as its own dispatches before have: it is over
+/// all views of a level, reads no planes of other views and writes no half pixels, which these
+/// read.
 bool views_are_independent(const Schedule& schedule, const Dispatch& dispatch);
 
 }  // namespace widestereo
