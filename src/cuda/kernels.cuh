@@ -158,9 +158,8 @@ template <class C>
 constexpr int least_blocks(std::string_view kernel) {
   if (C::camera_model < 0) return 4;
   if (kernel == "regress" || kernel == "vote_normal") return 5;
-  const bool few_registers = C::window_radius == fast_window_radius || C::warp == WARP_AFFINE;
   if (C::window_radius == quality_window_radius) return kernel == "vote" ? 6 : 5;
-  return few_registers ? 8 : 5;
+  return C::warp == WARP_AFFINE ? 8 : 5;
 }
 
 #define KERNEL(name, view)                                                             \
