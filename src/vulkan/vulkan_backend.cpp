@@ -304,14 +304,18 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stage
                                      nullptr, 0, nullptr);
 }
 
-void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map) {
+void VulkanBackend::stage(int view, const cv::Mat& map, int type) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
-  require_map(map, view, size, CV_32FC4);
-  map.copyTo(cv::Mat(size, CV_32FC4, staging_.mapped));
+  require_map(map, view, size, type);
+  map.copyTo(cv::Mat(size, type, staging_.mapped));
+}
+
+void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map) {
+  stage(view, map, CV_32FC4);
   const Atlas::Place& place = map_atlas_.places[static_cast<std::size_t>(view)];
   const VkCommandBuffer commands = submissions_[0]->begin();
   const VkImageSubresourceRange layer = layer_range(place.layer, 1);
-  const VkBufferImageCopy region = region_of(place, size);
+  const VkBufferImageCopy region = region_of(place, map.size());
   transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
   context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
                                        VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
@@ -342,9 +346,8 @@ cv::Mat VulkanBackend::download(MapKind kind, int view) {
 
 void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view, rays); }
 void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
-  const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
-  require_map(intensity, view, size, CV_32FC1);
-  intensity.copyTo(cv::Mat(size, CV_32FC1, staging_.mapped));
+  stage(view, intensity, CV_32FC1);
+  const cv::Size size = intensity.size();
   const IntensityPlace& place = intensity_places_[static_cast<std::size_t>(view)];
   const VkDeviceSize row = static_cast<VkDeviceSize>(size.width) * sizeof(float);
   std::vector<VkBufferCopy> rows;

@@ -80,6 +80,8 @@ class VulkanBackend final : public Backend {
                   VkImageLayout to) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
+  /// Puts a map for a view into the staging buffer.
+  void stage(int view, const cv::Mat& map, int type);
   void upload(const LayeredImage& image, int view, const cv::Mat& map);
   cv::Mat download(MapKind kind, int view);
   int views_of_level() const { return constants_.source_count + 1; }
