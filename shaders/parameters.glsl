@@ -39,6 +39,12 @@
 #define PATTERN_DENSE 0
 #define PATTERN_CHECKERBOARD 1
 
+// Of the full window.
+FN int samples_of_patch(int radius, int pattern) {
+  int side = 2 * radius + 1;
+  return pattern == PATTERN_CHECKERBOARD ? (side * side + 1) / 2 : side * side;
+}
+
 #define FILTER_EXACT 0
 #define FILTER_DEVICE 1
 

@@ -264,10 +264,21 @@ FN float root_of_unlikeness(float difference, float inverse_scale) {
 }
 
 // Weight of a sample whose intensity differs from the centre's by `difference`. `inverse_scale`: PARAMETERS.support.x,
-// which loops read once. Zero for masked samples; others differ by 1 at most.
+// which loops read once.
 FN float sample_weight(CONTEXT_ARGUMENT float difference, float inverse_scale) {
-  if (WEIGHTED == 0) return difference > -2.0f ? 1.0f : 0.0f;
+  if (WEIGHTED == 0) return 1.0f;
   return 1.0f / eighth_power(root_of_unlikeness(difference, inverse_scale));
+}
+
+// Samples of the patch that the reference has.
+FN int samples_in_reference(CONTEXT_ARGUMENT ivec2 pixel) {
+  int samples = 0;
+  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
+      if (intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy)) >= 0.0f) ++samples;
+    }
+  }
+  return samples;
 }
 
 // Cost of a hypothesis against one source, INVALID_COST where too little of the patch is seen there.
@@ -281,8 +292,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
 
   ivec4 size = PARAMETERS.cameras[reference].size;
   float inverse_scale = PARAMETERS.support.x;
-  float of_patch = 0.0f;
-  float n = 0.0f;
+  float samples = 0.0f;
+  float n = 0.0f;  // sum of weights
   float sum_a = 0.0f;
   float sum_b = 0.0f;
   float sum_aa = 0.0f;
@@ -295,10 +306,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
     RowMap row;
     if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
     UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
-      float a = intensity_in_row(intensities_of_row, dx) - start.centre_a;
-      // Samples that are not seen weigh nothing: no branches, as most are seen.
-      float weight = sample_weight(CONTEXT a, inverse_scale);
-      of_patch += weight;
+      float a = intensity_in_row(intensities_of_row, dx);
       vec2 texel;
       bool seen = true;
       if (WARP == WARP_EXACT) {
@@ -310,20 +318,28 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
         texel = map_offset(CONTEXT row, float(dx));
       }
       float b = sample_image(CONTEXT source, camera.size, texel);
-      // A texel that is no number may have an intensity that is none, which no weight makes zero.
-      weight = seen && b >= 0.0f ? weight : 0.0f;
-      b = seen ? b - start.centre_b : 0.0f;
+      seen = seen && min(a, b) >= 0.0f;
+      a -= start.centre_a;
+      b -= start.centre_b;
+      float weight = sample_weight(CONTEXT a, inverse_scale);
       float weighted_a = weight * a;
       float weighted_b = weight * b;
-      n += weight;
-      sum_a += weighted_a;
-      sum_b += weighted_b;
-      sum_aa += weighted_a * a;
-      sum_bb += weighted_b * b;
-      sum_ab += weighted_a * b;
+      ADD_WHERE(seen, samples, 1.0f);
+      if (WEIGHTED != 0) ADD_WHERE(seen, n, weight);
+      ADD_WHERE(seen, sum_a, weighted_a);
+      ADD_WHERE(seen, sum_b, weighted_b);
+      ADD_WHERE(seen, sum_aa, weighted_a * a);
+      ADD_WHERE(seen, sum_bb, weighted_b * b);
+      ADD_WHERE(seen, sum_ab, weighted_a * b);
     }
   }
-  if (n < PARAMETERS.patch_limits.y * of_patch) return INVALID_COST;
+  if (WEIGHTED == 0) n = samples;
+  // The reference may have less than the window; its samples are counted only where that decides.
+  float least = PARAMETERS.patch_limits.y;
+  if (samples < least * float(samples_of_patch(WINDOW_RADIUS, PATTERN)) &&
+      samples < least * float(samples_in_reference(CONTEXT pixel))) {
+    return INVALID_COST;
+  }
   return zncc_cost(n, sum_a, sum_b, sum_aa, sum_bb, sum_ab, PARAMETERS.patch_limits.x);
 }
 

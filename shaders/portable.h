@@ -40,6 +40,9 @@
 #define CONTEXT_ARGUMENT_ONLY const Context &context
 #define PARAMETERS context.parameters
 #define PASS context.pass
+// Adds where a condition holds, without a branch: CUDA under a predicate, others a zero elsewhere.
+#define ADD_WHERE(condition, sum, x) \
+  if (condition) sum += x
 
 #include <math.h>
 #include <string.h>
@@ -57,6 +60,7 @@
 #define CONTEXT_ARGUMENT_ONLY
 #define PARAMETERS parameters
 #define PASS pass
+#define ADD_WHERE(condition, sum, x) sum += (condition) ? x : 0.0f
 #define real float
 #define real2 vec2
 #define real3 vec3

@@ -158,7 +158,6 @@ template <class C>
 constexpr int least_blocks(std::string_view kernel) {
   if (C::camera_model < 0) return 4;
   if (kernel == "regress" || kernel == "vote_normal") return 5;
-  if (C::window_radius == quality_window_radius) return kernel == "vote" ? 6 : 5;
   return C::warp == WARP_AFFINE ? 8 : 5;
 }
 
@@ -184,8 +183,9 @@ KernelTable table_of(const KernelEntry (&entries)[count]) {
 
 /// Calls `get`, a callable over a Constants tag, with those of a camera model and a number of
 /// sources. Pairs have instances of their own for each model, more views one for all.
-template <int Radius, int Warp, int Pattern, int Weighted, class Get>
+template <int Radius, int Warp, int Pattern, class Get>
 KernelTable for_rig(int camera_model, int source_count, Get get) {
+  constexpr int Weighted = 0;
   constexpr int Filter = FILTER_DEVICE;
   if (source_count != 1) return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1, -1>());
   switch (camera_model) {
@@ -197,19 +197,5 @@ KernelTable for_rig(int camera_model, int source_count, Get get) {
       return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1, 1>());
   }
 }
-
-/// The kernels of the coarse-to-fine search that take most of its time.
-struct PyramidKernels {
-  template <class C>
-  KernelTable operator()(C) const {
-    static const KernelEntry entries[] = {
-        KERNEL_ENTRY(sweep, C),       KERNEL_ENTRY(upsample, C),   KERNEL_ENTRY(search, C),
-        KERNEL_ENTRY(measure, C),     KERNEL_ENTRY(regress, C),    KERNEL_ENTRY(adopt, C),
-        KERNEL_ENTRY(check, C),       KERNEL_ENTRY(adopt_fill, C), KERNEL_ENTRY(vote, C),
-        KERNEL_ENTRY(renew, C),       KERNEL_ENTRY(subpixel, C),   KERNEL_ENTRY(ambiguity, C),
-        KERNEL_ENTRY(adopt_point, C), KERNEL_ENTRY(vote_normal, C)};
-    return table_of(entries);
-  }
-};
 
 }  // namespace widestereo::kernel::cuda

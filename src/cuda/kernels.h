@@ -57,19 +57,17 @@ struct KernelTable {
 
 /// Window radii of the presets that have kernels of their own.
 inline constexpr int paper_window_radius = 5;
-inline constexpr int quality_window_radius = 4;
-inline constexpr int fast_window_radius = 3;
+inline constexpr int pyramid_window_radius = 3;
 
 /// Every kernel, for any constants.
 KernelTable generic_kernels();
 /// The kernels that take most of the time, with filtering by the texture units, compiled for the
 /// window and the constants of a preset: `paper` (exact warp, dense), the same with the affine
-/// warp, `quality` or `fast` (affine, checkerboard, weighted).
+/// warp, `quality` and `fast` (affine, checkerboard).
 /// `camera_model`: a camera model that has kernels of its own (kannala_brandt, double_sphere),
 /// anything else selects those for all models. With one source, they are compiled for that, too.
 KernelTable paper_kernels(int camera_model, int source_count);
 KernelTable affine_paper_kernels(int camera_model, int source_count);
-KernelTable quality_kernels(int camera_model, int source_count);
-KernelTable fast_kernels(int camera_model, int source_count);
+KernelTable pyramid_kernels(int camera_model, int source_count);
 
 }  // namespace widestereo::kernel::cuda

@@ -18,19 +18,17 @@ const void* find(const KernelTable& table, std::string_view name) {
 }
 
 KernelTable specialised_kernels(const KernelConstants& c) {
-  const auto is = [&c](int radius, PatchWarp warp, PatchPattern pattern, bool weighted) {
+  const auto is = [&c](int radius, PatchWarp warp, PatchPattern pattern) {
     return c.filter == static_cast<int>(Filter::device) && c.window_radius == radius &&
            c.warp == static_cast<int>(warp) && c.pattern == static_cast<int>(pattern) &&
-           (c.weighted != 0) == weighted;
+           c.weighted == 0;
   };
-  if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense, false))
+  if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense))
     return paper_kernels(c.camera_model, c.source_count);
-  if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, false))
+  if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense))
     return affine_paper_kernels(c.camera_model, c.source_count);
-  if (is(quality_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
-    return quality_kernels(c.camera_model, c.source_count);
-  if (is(fast_window_radius, PatchWarp::affine, PatchPattern::checkerboard, true))
-    return fast_kernels(c.camera_model, c.source_count);
+  if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard))
+    return pyramid_kernels(c.camera_model, c.source_count);
   return {nullptr, 0};
 }
 

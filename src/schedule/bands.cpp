@@ -11,9 +11,9 @@ namespace {
 constexpr long long rows_of_workgroup = 8;
 
 /// Samples of the search that take as long as a neighbour of a regression, or one whose plane votes
-/// for the candidates; about a third more than on software Vulkan.
-constexpr long long samples_of_neighbour = 2;
-constexpr long long samples_of_voter = 4;
+/// for the candidates, by their operations; fewer do on software Vulkan.
+constexpr long long samples_of_neighbour = 4;
+constexpr long long samples_of_voter = 6;
 
 /// Neighbours of a pixel that no neighbourhood determines, which is asked in every round.
 long long neighbours_of_regression(const kernel::PassParameters& pass) {

@@ -47,9 +47,8 @@ Options Options::preset_named(const std::string& name) {
   options.search = SearchMethod::pyramid;
   options.warp = PatchWarp::affine;
   options.sampling = DistanceSampling::inverse;
-  options.window_radius = 4;
+  options.window_radius = 3;
   options.interpolation = Interpolation::cubic;
-  options.weight_scale = 12;
   options.min_texture = 0;
   options.max_cost = 0.8;
   options.far_preference = 0.08;
@@ -57,7 +56,6 @@ Options Options::preset_named(const std::string& name) {
   options.pattern = PatchPattern::checkerboard;
   if (name == "fast") {
     options.sweep_steps = 16;
-    options.window_radius = 3;
     options.source_planes = false;
     options.coarse_planes = 2;
     options.alternate_strips = true;

@@ -274,9 +274,9 @@ class Builder {
   /// The same, `patches` being those in all sources together.
   void add_with_patches(Kernel kernel, const kernel::PassParameters& pass, Views over,
                         int patches) {
-    add_with_samples(
-        kernel, pass, over,
-        patches * samples_of_patch(schedule_.constants.window_radius, schedule_.constants.pattern));
+    add_with_samples(kernel, pass, over,
+                     patches * kernel::samples_of_patch(schedule_.constants.window_radius,
+                                                        schedule_.constants.pattern));
   }
 
   /// `samples`: per pixel, in all sources together.
@@ -469,9 +469,9 @@ class Builder {
     pass.iteration = regressions_;
     pass.radius = options_.vote_radius;
     // Those of the pixel's own plane and of its rivals, in the source that tells most.
-    add_with_samples(
-        Kernel::vote, pass, views_of(0),
-        (1 + VOTE_RIVALS) * samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
+    add_with_samples(Kernel::vote, pass, views_of(0),
+                     (1 + VOTE_RIVALS) *
+                         kernel::samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
     adopt_voted();
   }
 
@@ -538,12 +538,6 @@ const char* to_string(Kernel kernel) {
 #include "kernel_list.h"
       "iterate_raster"};
   return names[static_cast<std::size_t>(kernel)];
-}
-
-long long samples_of_patch(int window_radius, int pattern) {
-  const long long side = 2 * window_radius + 1;
-  return pattern == static_cast<int>(PatchPattern::checkerboard) ? (side * side + 1) / 2
-                                                                 : side * side;
 }
 
 Schedule make_schedule(const Rig& rig, const Options& options) {

@@ -53,9 +53,6 @@ struct Schedule {
   std::vector<View> views;
 };
 
-/// Samples of a patch at its full window.
-long long samples_of_patch(int window_radius, int pattern);
-
 /// Throws Error when rig or options are invalid, there are fewer than 2 views, more than
 /// MAX_IMAGES, or those of all levels together are more than MAX_VIEWS.
 Schedule make_schedule(const Rig& rig, const Options& options);

@@ -184,8 +184,9 @@ PatchOperations patch_operations(const KernelConstants& c) {
   const int weighting = c.weighted != 0 ? weight_of_sample : 0;
   const int warp_ray = warp_ray_before_projection + projection(c.camera_model);
   const int map_offset = quadratic ? map_offset_quadratic : map_offset_affine;
-  // Two differences from the centre, two sums of weights, five of intensities and their products.
-  const int sums = 2 + 2 + 8 + (c.weighted != 0 ? 2 : 0);
+  // Two differences from the centre, a count, five sums of intensities and their products; weights
+  // take a sum and two products more.
+  const int sums = 2 + 1 + 8 + (c.weighted != 0 ? 3 : 0);
   PatchOperations operations;
   operations.of_sample = weighting + (exact ? warp_ray + texel_at(c.filter) : map_offset) +
                          sample_image(c.filter) + sums;
@@ -212,8 +213,8 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const PatchOperations operations = patch_operations(schedule.constants);
   const auto samples = static_cast<double>(dispatch.samples);
   const double patches =
-      samples / static_cast<double>(
-                    samples_of_patch(schedule.constants.window_radius, schedule.constants.pattern));
+      samples / static_cast<double>(kernel::samples_of_patch(schedule.constants.window_radius,
+                                                             schedule.constants.pattern));
   const auto pixels = static_cast<double>(dispatch.pixels);
   const Traffic traffic = traffic_of(dispatch);
   const int sources = schedule.constants.source_count;

@@ -34,7 +34,7 @@ bool is_kernel_of_the_schedule(const void* function) {
   if (contains(kernel::cuda::generic_kernels(), function)) return true;
   for (const int model : {CAMERA_KANNALA_BRANDT, CAMERA_DOUBLE_SPHERE, -1}) {
     for (const auto& get : {kernel::cuda::paper_kernels, kernel::cuda::affine_paper_kernels,
-                            kernel::cuda::quality_kernels, kernel::cuda::fast_kernels}) {
+                            kernel::cuda::pyramid_kernels}) {
       for (const int sources : {1, 2}) {
         if (contains(get(model, sources), function)) return true;
       }

@@ -130,7 +130,7 @@ TEST_F(Measure, SubpixelMatchNeedsEvidence) {
 }
 
 TEST_F(Measure, GradientsOfBrightnessAndNoiseDetermineNoDistance) {
-  EXPECT_LT(median_variance(), 0.03) << "texture does";
+  EXPECT_LT(median_variance(), 0.04) << "texture does";
   // Gain and offset explain what a displacement does to a gradient.
   for (const auto& [noise, least] : {std::pair(0.0, 0.2), std::pair(0.004, 0.05)}) {
     for (int i = 0; i < 2; ++i) {

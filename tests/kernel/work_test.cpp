@@ -58,7 +58,7 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
                                           .warp = static_cast<int>(warp),
                                           .pattern = static_cast<int>(pattern),
                                           .weighted = weight_scale > 0 ? 1 : 0};
-          const long long samples = samples_of_patch(3, static_cast<int>(pattern));
+          const long long samples = kernel::samples_of_patch(3, static_cast<int>(pattern));
           const PatchOperations expected = patch_operations(constants);
           // Two products with the weight, which compilers leave out where it is one.
           const long long left_out = weight_scale > 0 ? 0 : 2 * samples;
@@ -187,7 +187,7 @@ TEST(Work, OfASubPixelMatchIsAPatchInOneSource) {
   rig.views[2].world_from_camera.translation().y() += 0.1;
   const Schedule schedule = make_schedule(rig, Options::preset_named("fast"));
   const KernelConstants& constants = schedule.constants;
-  const long long samples = samples_of_patch(constants.window_radius, constants.pattern);
+  const long long samples = kernel::samples_of_patch(constants.window_radius, constants.pattern);
   int matches = 0;
   for (const Dispatch& dispatch : schedule.dispatches) {
     if (dispatch.kernel == Kernel::subpixel) {
