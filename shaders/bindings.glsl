@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Images are 2D arrays: of half pixels one
+// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Images are 2D arrays: of texels one
 // for each level, with a layer for each of its views, as texture units must clamp to them; of maps one for all levels, in
 // which coarse views share layers (src/vulkan/atlas.h). Intensities lie in a buffer, for loads from images take texture
 // units, which have the samples to filter.
 //
 // Every kernel is compiled twice, for images that are read with the same bits. GPUs gather or filter four texels in one
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
-// and have the four half pixels of a sample in one texel, which takes them much less than four texels of one. Where texture
-// units filter, `interpolate` is compiled once more, for half pixels of half precision (HALF_PRECISION).
+// and have the four numbers of a sample in one texel, which takes them much less than four texels of one. Where texture
+// units filter, `interpolate` is compiled once more, for texels of half precision (HALF_PRECISION).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -19,6 +19,7 @@ layout(constant_id = 3) const int SOURCE_COUNT = 1;
 #define ONE_SOURCE (SOURCE_COUNT == 1)
 layout(constant_id = 4) const int PATTERN = 0;
 layout(constant_id = 5) const int WEIGHTED = 0;
+layout(constant_id = 7) const int TEXELS_PER_PIXEL = 1;
 #ifdef TEXEL_LOADS
 #define FILTER FILTER_EXACT
 #else
@@ -30,15 +31,15 @@ layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parame
 layout(set = 0, binding = 1, std430) buffer IntensityBlock { float intensities[]; };
 layout(set = 0, binding = 2, rgba32f) readonly uniform image2DArray rays;
 layout(set = 0, binding = 3, rgba32f) uniform image2DArray hypotheses;  // and, in further layers, priors and checks
-layout(set = 0, binding = 4) uniform sampler2DArray half_pixel_texture;
+layout(set = 0, binding = 4) uniform sampler2DArray texel_texture;
 layout(set = 0, binding = 5, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 6, std430) buffer WinnerBlock { uint transfer_winner[]; };
 #ifdef TEXEL_LOADS
-layout(set = 0, binding = 7, rgba32f) uniform image2DArray half_pixels;  // with the right, lower and lower right one
+layout(set = 0, binding = 7, rgba32f) uniform image2DArray texels;  // with the right, lower and lower right one
 #elif defined HALF_PRECISION
-layout(set = 0, binding = 7, r16f) uniform image2DArray half_pixels;
+layout(set = 0, binding = 7, r16f) uniform image2DArray texels;
 #else
-layout(set = 0, binding = 7, r32f) uniform image2DArray half_pixels;
+layout(set = 0, binding = 7, r32f) uniform image2DArray texels;
 #endif
 layout(set = 0, binding = 8, std140) uniform PlaceBlock {
   ivec4 map_places[MAX_VIEWS];        // x, y and layer of a view's pixel (0, 0); layers of one kind of map
@@ -73,34 +74,34 @@ IntensityRow intensity_row(int view, ivec2 p) {
 float intensity_in_row(IntensityRow row, int dx) { return intensities[row + dx]; }
 
 // Views of a level follow each other, and sources are of the reference's level.
-int layer_of_half_pixels(int view) { return view - pass.first_view; }
+int layer_of_texels(int view) { return view - pass.first_view; }
 
-ivec3 in_half_pixels(int view, ivec2 p) { return ivec3(p + HALF_PIXEL_APRON, layer_of_half_pixels(view)); }
+ivec3 in_texels(int view, ivec2 p) { return ivec3(p + TEXEL_APRON, layer_of_texels(view)); }
 
 vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, in_maps(view, p)); }
 
 #ifdef TEXEL_LOADS
 
-vec4 half_pixel_taps(int view, ivec2 p) { return imageLoad(half_pixels, in_half_pixels(view, p)); }
+vec4 texel_taps(int view, ivec2 p) { return imageLoad(texels, in_texels(view, p)); }
 
 #else
 
 // Asked for once, not for each sample.
-vec2 half_pixel_size = 1.0f / vec2(textureSize(half_pixel_texture, 0).xy);
+vec2 texel_size = 1.0f / vec2(textureSize(texel_texture, 0).xy);
 
 // Texture coordinates of a position in texels of the memory.
-vec3 half_pixel_position(int view, vec2 texel) {
-  return vec3(texel * half_pixel_size, float(layer_of_half_pixels(view)));
+vec3 texel_position(int view, vec2 texel) {
+  return vec3(texel * texel_size, float(layer_of_texels(view)));
 }
 
-vec4 half_pixel_taps(int view, ivec2 p) {
+vec4 texel_taps(int view, ivec2 p) {
   // The corner that the four texels share lies half a texel from any rounding trouble.
-  vec4 taps = textureGather(half_pixel_texture, half_pixel_position(view, vec2(p + HALF_PIXEL_APRON + 1)));
+  vec4 taps = textureGather(texel_texture, texel_position(view, vec2(p + TEXEL_APRON + 1)));
   return vec4(taps.w, taps.z, taps.x, taps.y);
 }
 
-float filtered_half_pixel(int view, vec2 texel) {
-  return textureLod(half_pixel_texture, half_pixel_position(view, texel), 0.0f).x;
+float filtered_texel(int view, vec2 texel) {
+  return textureLod(texel_texture, texel_position(view, texel), 0.0f).x;
 }
 
 #endif
@@ -108,11 +109,11 @@ float filtered_half_pixel(int view, vec2 texel) {
 float intensity_at(int view, ivec2 p) { return intensity_in_row(intensity_row(view, p), 0); }
 
 // Images of one number a texel take the first.
-void store_half_pixel(int view, ivec2 p, vec4 taps) {
+void store_texel(int view, ivec2 p, vec4 taps) {
 #ifdef HALF_PRECISION
   taps = max(taps, vec4(LOWEST_HALF));
 #endif
-  imageStore(half_pixels, in_half_pixels(view, p), taps);
+  imageStore(texels, in_texels(view, p), taps);
 }
 
 vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(view, p)); }

@@ -155,7 +155,7 @@ FN float confidence_of(float displacement, float support, float unexplained, flo
 FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   vec2 position;
   if (!position_in_source(CONTEXT source, ray, w, position)) return MASKED_INTENSITY;
-  return sample_image(CONTEXT source, PARAMETERS.cameras[source].size, texel_at(position, FILTER));
+  return sample_image(CONTEXT source, PARAMETERS.cameras[source].size, texel_at(CONTEXT position));
 }
 
 // Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the

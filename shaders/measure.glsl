@@ -36,11 +36,13 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
 
 // The reference's intensity at q and its change per pixel of displacement in the source; false where it is not seen.
 FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity, OUT(float) slope) {
-  // Of the half pixels around it, those above and to the left, and those to the right and below.
-  vec4 before = half_pixel_taps(CONTEXT REFERENCE, ivec2(2 * q.x - 1, 2 * q.y - 1));
-  vec4 after = half_pixel_taps(CONTEXT REFERENCE, ivec2(2 * q.x, 2 * q.y));
+  // Of the texels around it, those above and to the left, and those to the right and below.
+  ivec2 own = ivec2(TEXELS_PER_PIXEL * q.x, TEXELS_PER_PIXEL * q.y);
+  vec4 before = texel_taps(CONTEXT REFERENCE, ivec2(own.x - 1, own.y - 1));
+  vec4 after = texel_taps(CONTEXT REFERENCE, own);
   intensity = after.x;
-  slope = (after.y - before.z) * direction.x + (after.z - before.y) * direction.y;
+  slope = 0.5f * float(TEXELS_PER_PIXEL) *
+          ((after.y - before.z) * direction.x + (after.z - before.y) * direction.y);
   return min(min(min(before.z, after.y), min(before.y, after.z)), intensity) >= 0.0f;
 }
 

@@ -15,8 +15,9 @@
 // Of a pixel without a plane: the largest cost of all.
 #define INVALID_COST 2.0f
 
-// Sources are read from images of twice the size, which have a texel at every half pixel (interpolation.glsl).
-#define HALF_PIXEL_APRON (2 * APRON)
+// Sources are sampled from images of texels: one at every pixel or, for cubic interpolation, at every half pixel, too
+// (interpolation.glsl).
+#define TEXEL_APRON (TEXELS_PER_PIXEL * APRON)
 
 // In a vote, the planes that stand for election besides the pixel's own (of pixels in eight directions, at half the
 // radius and at it), the steps between the pixels that vote in a row and between their rows, the planes that then compete
@@ -84,9 +85,8 @@ FN int samples_of_patch(int radius, int pattern) {
 #define CANDIDATE_SURROUNDINGS 12
 #define CANDIDATE_SOURCE_PLANE 13
 
-// Bits of PassParameters.candidates of other kernels: see intensity_between(), regress_plane(), adopt_pixel(),
+// Bits of PassParameters.candidates of other kernels: see regress_plane(), adopt_pixel(),
 // check_pixel() and adopt_fill_pixel(), where it stands beside the reasons.
-#define INTERPOLATE_CUBIC 1u
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
 #define CHECK_FOR_VOTE 1u

@@ -30,24 +30,24 @@ FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
   return ray.w != 0.0f && intensity_at(CONTEXT REFERENCE, pixel) >= 0.0f;
 }
 
-// Where a position (pixels) lies in what sample_image() reads: in half pixels.
-FN vec2 texel_at(vec2 position, int filter_kind) {
-  vec2 texel = 2.0f * position;
-  if (filter_kind == FILTER_EXACT) return texel;
-  return texel + vec2(float(HALF_PIXEL_APRON) + 0.5f, float(HALF_PIXEL_APRON) + 0.5f);
+// Where a position (pixels) lies in what sample_image() reads.
+FN vec2 texel_at(CONTEXT_ARGUMENT vec2 position) {
+  vec2 texel = float(TEXELS_PER_PIXEL) * position;
+  if (FILTER == FILTER_EXACT) return texel;
+  return texel + vec2(float(TEXEL_APRON) + 0.5f, float(TEXEL_APRON) + 0.5f);
 }
 
 // Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others, and every image
 // is surrounded by masked ones. The weights are exact, or those of the texture units (1/256 on most GPUs).
 FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
 #ifdef HAS_DEVICE_FILTER
-  if (FILTER == FILTER_DEVICE) return filtered_half_pixel(CONTEXT view, texel);
+  if (FILTER == FILTER_DEVICE) return filtered_texel(CONTEXT view, texel);
 #endif
-  float x = min(float(2 * size.x), max(-2.0f, texel.x));
-  float y = min(float(2 * size.y), max(-2.0f, texel.y));
+  float x = min(float(TEXELS_PER_PIXEL * size.x), max(-2.0f, texel.x));
+  float y = min(float(TEXELS_PER_PIXEL * size.y), max(-2.0f, texel.y));
   float left = floor(x);
   float top = floor(y);
-  vec4 taps = half_pixel_taps(CONTEXT view, ivec2(int(left), int(top)));
+  vec4 taps = texel_taps(CONTEXT view, ivec2(int(left), int(top)));
   float across = x - left;
   float upper = taps.x + across * (taps.y - taps.x);
   float lower = taps.z + across * (taps.w - taps.z);
@@ -188,18 +188,19 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   start.warp = warp_through(pair, m);
   vec2 centre;
   if (!warp_pixel(CONTEXT start.warp, camera, model, pixel, centre)) return false;
-  start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(centre, FILTER));
+  start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(CONTEXT centre));
   start.centre_a = intensity_at(CONTEXT REFERENCE, pixel);
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
   if (!mapped) return true;
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
-  start.map.u0 = texel_at(start.map.u0, FILTER);
-  start.map.ux = 2.0f * start.map.ux;
-  start.map.uy = 2.0f * start.map.uy;
+  start.map.u0 = texel_at(CONTEXT start.map.u0);
+  float scale = float(TEXELS_PER_PIXEL);
+  start.map.ux = scale * start.map.ux;
+  start.map.uy = scale * start.map.uy;
   if (WARP == WARP_QUADRATIC) {
-    start.map.uxx = 2.0f * start.map.uxx;
-    start.map.uxy = 2.0f * start.map.uxy;
-    start.map.uyy = 2.0f * start.map.uyy;
+    start.map.uxx = scale * start.map.uxx;
+    start.map.uxy = scale * start.map.uxy;
+    start.map.uyy = scale * start.map.uyy;
   }
   return true;
 }
@@ -313,7 +314,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
         // The image ends where its intensities are masked.
         vec4 ray = ray_at(CONTEXT reference, nearest_in_image(size, ivec2(begin.x + dx, begin.y)));
         seen = warp_ray(start.warp, camera, model, vec3(ray.x, ray.y, ray.z), texel);
-        texel = texel_at(texel, FILTER);
+        texel = texel_at(CONTEXT texel);
       } else {
         texel = map_offset(CONTEXT row, float(dx));
       }

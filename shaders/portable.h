@@ -9,13 +9,15 @@
 //   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON pixels outside
 //   IntensityRow intensity_row(view, pixel), float intensity_in_row(row, dx)
 //                                           the same, dx pixels to the right of that pixel, from one address for a row
-//   vec4  half_pixel_taps(view, texel)      intensity at a half pixel (0, 0: pixel 0, 0; 1, 0: half a pixel to its right)
-//                                           and at its right, lower and lower right neighbour
-//   float filtered_half_pixel(view, texel)  bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
-//                                           its centre at HALF_PIXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
-//   void  store_half_pixel(view, texel, vec4)   as half_pixel_taps() reads them, of which memories may keep the first
+//   vec4  texel_taps(view, texel)           intensity of a texel (0, 0: pixel 0, 0; 1, 0: a pixel to its right, or half a
+//                                           one, see TEXELS_PER_PIXEL) and of its right, lower and lower right neighbour
+//   float filtered_texel(view, texel)       bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
+//                                           its centre at TEXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
+//   void  store_texel(view, texel, vec4)    as texel_taps() reads them, of which memories may keep the first
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
 //   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl;
+//   TEXELS_PER_PIXEL                        each way, of the images that sources are sampled from: 1, or 2 where
+//                                           interpolate_pixel() makes half pixels
 //   SOURCE_COUNT                            of a view, and ONE_SOURCE, whether a compiler knows it to be 1
 //   VIEW_OF_LAUNCH                          which of the views that one launch runs over this thread has, from 0.
 #ifndef WIDESTEREO_PORTABLE_H

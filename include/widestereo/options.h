@@ -34,17 +34,18 @@ enum class PatchPattern : int {
 
 /// Intensities halfway between a source's pixels, from which the others follow bilinearly.
 enum class Interpolation : int {
-  linear = 0,  ///< means of the pixels: bilinear between pixels, too
+  linear = 0,  ///< none: samples are bilinear ones of the pixels
   cubic = 1,   ///< of Catmull and Rom's spline: keeps fine texture, as the reference has it
 };
 
-/// How half pixels are sampled, always bilinearly (values of the kernels, shaders/parameters.glsl).
+/// How samples are taken of pixels and half pixels, always bilinearly (values of the kernels,
+/// shaders/parameters.glsl).
 enum class Filter : int {
   exact = 0,   ///< in single precision. On CUDA with the CPU's very bits, at the price of speed
   device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their
-               ///< positions are rounded, to 1/512 pixel on most, and half pixels have half
-               ///< precision, where a Vulkan device can write that. Exact on CPUs and on Vulkan
-               ///< devices that cannot filter floats (StereoResult::filter says which)
+               ///< positions are rounded, to 1/256 pixel on most (cubic: 1/512), and pixels have
+               ///< half precision, where a Vulkan device can write that. Exact on CPUs and on
+               ///< Vulkan devices that cannot filter floats (StereoResult::filter says which)
 };
 
 /// How planes are found.

@@ -24,12 +24,13 @@ constexpr std::array<PixelFunction, kernel_count> pixel_functions = {
 
 class CpuBackend final : public Backend {
  public:
-  explicit CpuBackend(const std::vector<cv::Size>& sizes) : views_(sizes.size()) {
+  CpuBackend(const std::vector<cv::Size>& sizes, const KernelConstants& constants)
+      : constants_(constants), views_(sizes.size()) {
     cv::Size largest;
     for (std::size_t i = 0; i < sizes.size(); ++i) {
-      views_[i].set_size(sizes[i]);
+      views_[i].set_size(sizes[i], constants);
       bytes_ += static_cast<std::size_t>(sizes[i].area()) * 4 * sizeof(cv::Vec4f) +
-                (views_[i].intensities.total() + views_[i].half_pixels.total()) * sizeof(float);
+                (views_[i].intensities.total() + views_[i].texels.total()) * sizeof(float);
       largest = {std::max(largest.width, sizes[i].width),
                  std::max(largest.height, sizes[i].height)};
     }
@@ -51,6 +52,7 @@ class CpuBackend final : public Backend {
   std::size_t device_bytes() const override { return bytes_; }
 
   void run(const Schedule& schedule, const Matcher::Progress& progress) override {
+    require_constants(schedule, constants_);
     times_.clear();
     ScheduleProgress done(schedule, progress);
     for (const Dispatch& dispatch : schedule.dispatches) {
@@ -101,6 +103,7 @@ class CpuBackend final : public Backend {
     }
   }
 
+  KernelConstants constants_;
   std::vector<kernel::cpu::ViewMemory> views_;
   cv::Mat_<int> transfer_nearest_;
   cv::Mat_<int> transfer_winner_;
@@ -112,9 +115,9 @@ class CpuDevice final : public Device::Implementation {
  public:
   CpuDevice() { info = cpu_device_info(); }
   std::unique_ptr<Backend> make_backend(const std::vector<cv::Size>& sizes,
-                                        const KernelConstants&) override {
+                                        const KernelConstants& constants) override {
     try {
-      return std::make_unique<CpuBackend>(sizes);
+      return std::make_unique<CpuBackend>(sizes, constants);
     } catch (const std::exception&) {  // std::bad_alloc or cv::Exception
       throw Error("Not enough memory for the maps of these image sizes; use smaller images.");
     }

@@ -14,15 +14,15 @@ namespace widestereo::kernel::cpu {
 struct ViewMemory {
   cv::Mat_<cv::Vec4f> rays;
   cv::Mat_<float> intensities;  ///< surrounded by APRON masked pixels
-  cv::Mat_<float> half_pixels;  ///< by HALF_PIXEL_APRON masked ones
+  cv::Mat_<float> texels;       ///< by TEXEL_APRON masked ones
   cv::Mat_<cv::Vec4f> hypotheses;
   cv::Mat_<cv::Vec4f> checks;
   cv::Mat_<cv::Vec4f> priors;
 
-  void set_size(cv::Size size) {
+  void set_size(cv::Size size, const KernelConstants& constants) {
     for (cv::Mat_<cv::Vec4f>* map : {&rays, &hypotheses, &checks, &priors}) map->create(size);
     intensities = cv::Mat_<float>(with_apron(size), MASKED_INTENSITY);
-    half_pixels = cv::Mat_<float>(size_of_half_pixels(size), MASKED_INTENSITY);
+    texels = cv::Mat_<float>(size_of_texels(size, constants), MASKED_INTENSITY);
   }
   /// The intensities without the apron.
   cv::Mat_<float> image() { return intensities(cv::Rect({APRON, APRON}, rays.size())); }
@@ -48,6 +48,7 @@ struct Context {
 #define PATTERN context.constants.pattern
 #define WEIGHTED context.constants.weighted
 #define FILTER FILTER_EXACT
+#define TEXELS_PER_PIXEL context.constants.texels_per_pixel
 
 inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 
@@ -62,16 +63,16 @@ inline float intensity_in_row(IntensityRow row, int dx) { return row[dx]; }
 inline float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return *intensity_row(CONTEXT view, p);
 }
-inline float* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
-  return &context.views[view].half_pixels(p.y + HALF_PIXEL_APRON, p.x + HALF_PIXEL_APRON);
+inline float* texel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return &context.views[view].texels(p.y + TEXEL_APRON, p.x + TEXEL_APRON);
 }
-inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
-  const float* top = half_pixel_address(CONTEXT view, p);
-  const float* bottom = half_pixel_address(CONTEXT view, ivec2(p.x, p.y + 1));
+inline vec4 texel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+  const float* top = texel_address(CONTEXT view, p);
+  const float* bottom = texel_address(CONTEXT view, ivec2(p.x, p.y + 1));
   return {top[0], top[1], bottom[0], bottom[1]};
 }
-inline void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
-  *half_pixel_address(CONTEXT view, p) = taps.x;
+inline void store_texel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
+  *texel_address(CONTEXT view, p) = taps.x;
 }
 inline void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
   context.views[view].intensities(p.y + APRON, p.x + APRON) = intensity;

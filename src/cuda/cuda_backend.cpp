@@ -21,7 +21,7 @@ std::size_t area(cv::Size size) {
 }
 
 /// Texels of fewer bytes collide less in the texture cache, which would bound the search.
-int half_pixel_bytes(const KernelConstants& constants) {
+int texel_bytes_of(const KernelConstants& constants) {
   return constants.filter == static_cast<int>(Filter::device) ? 2 : 4;
 }
 
@@ -112,6 +112,7 @@ CudaBackend::CudaBackend(CudaTarget target, const std::vector<cv::Size>& sizes,
   context_.pattern = constants.pattern;
   context_.weighted = constants.weighted;
   context_.filter = constants.filter;
+  context_.texels_per_pixel = constants.texels_per_pixel;
   context_.source_count = constants.source_count;
 }
 
@@ -147,18 +148,18 @@ void CudaBackend::make_maps() {
     ViewMaps& maps = maps_.emplace_back();
     maps.rays = DeviceArray<float4>(pixels, stream, name, "the viewing rays");
     maps.intensities = DeviceImage(with_apron(size), APRON, sizeof(float), stream, name);
-    maps.half_pixels = DeviceImage(size_of_half_pixels(size), HALF_PIXEL_APRON,
-                                   half_pixel_bytes(constants_), stream, name);
-    maps.texture = maps.half_pixels.make_texture(name);
+    maps.texels = DeviceImage(size_of_texels(size, constants_), constants_.texels_per_pixel * APRON,
+                              texel_bytes_of(constants_), stream, name);
+    maps.texture = maps.texels.make_texture(name);
     maps.hypotheses = DeviceArray<float4>(pixels, stream, name, "the planes");
     maps.checks = DeviceArray<float4>(pixels, stream, name, "the consistency maps");
     maps.priors = DeviceArray<float4>(pixels, stream, name, "the planes' priors");
     context_.views[maps_.size() - 1] = {
         maps.rays.get(),           static_cast<float*>(maps.intensities.get()),
-        maps.half_pixels.get(),    maps.texture.get(),
+        maps.texels.get(),         maps.texture.get(),
         maps.hypotheses.get(),     maps.checks.get(),
         maps.priors.get(),         size.width,
-        maps.intensities.stride(), maps.half_pixels.stride()};
+        maps.intensities.stride(), maps.texels.stride()};
     largest = std::max(largest, pixels);
   }
   transfer_nearest_ =
@@ -175,7 +176,7 @@ std::size_t CudaBackend::device_bytes() const {
       transfer_nearest_.bytes() + transfer_winner_.bytes() + of_run_.parameters.bytes();
   for (const Prepared& prepared : prepared_) bytes += prepared.parameters.bytes();
   for (const ViewMaps& maps : maps_) {
-    bytes += maps.rays.bytes() + maps.intensities.bytes() + maps.half_pixels.bytes() +
+    bytes += maps.rays.bytes() + maps.intensities.bytes() + maps.texels.bytes() +
              maps.hypotheses.bytes() + maps.checks.bytes() + maps.priors.bytes();
   }
   return bytes;

@@ -52,7 +52,7 @@ class CudaBackend final : public Backend {
  private:
   struct ViewMaps {
     DeviceArray<float4> rays, hypotheses, checks, priors;
-    DeviceImage intensities, half_pixels;
+    DeviceImage intensities, texels;
     CudaTexture texture;  // of the half pixels; destroyed before them
   };
   /// Consecutive launches of a kernel; the i-th of a run lies between events_ i and i + 1.

@@ -7,6 +7,7 @@
 #include <cuda_runtime.h>
 
 #include <string_view>
+#include <type_traits>
 
 #include "cuda/kernels.h"
 #include "widestereo/options.h"
@@ -15,26 +16,29 @@ namespace widestereo::kernel::cuda {
 
 /// Constants known at compile time; -1 = read from the context. Without a model each source's own
 /// is used.
-template <int Radius, int Warp, int Pattern, int Weighted, int Filter, int Model, int Sources>
+template <int Radius, int Warp, int Pattern, int Weighted, int Filter, int TexelsPerPixel,
+          int Model, int Sources>
 struct Constants {
   static constexpr int window_radius = Radius;
   static constexpr int warp = Warp;
   static constexpr int pattern = Pattern;
   static constexpr int weighted = Weighted;
   static constexpr int filter = Filter;
+  static constexpr int texels_per_pixel = TexelsPerPixel;
   static constexpr int camera_model = Model;
   static constexpr int source_count = Sources;
   /// On the checkerboard rows start in turn one column later: two are the same for all turns.
   static constexpr int unrolled_rows =
       Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
 };
-using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1>;
+using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 
 #define WINDOW_RADIUS (C::window_radius >= 0 ? C::window_radius : context.window_radius)
 #define WARP (C::warp >= 0 ? C::warp : context.warp)
 #define PATTERN (C::pattern >= 0 ? C::pattern : context.pattern)
 #define WEIGHTED (C::weighted >= 0 ? C::weighted : context.weighted)
 #define FILTER (C::filter >= 0 ? C::filter : context.filter)
+#define TEXELS_PER_PIXEL (C::texels_per_pixel >= 0 ? C::texels_per_pixel : context.texels_per_pixel)
 #define CAMERA_MODEL (C::camera_model >= 0 ? C::camera_model : context.camera_model)
 #define SOURCE_COUNT (C::source_count >= 0 ? C::source_count : context.source_count)
 #define ONE_SOURCE (C::source_count == 1)
@@ -68,36 +72,67 @@ struct Algorithm {
   FN float intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
     return __ldg(intensity_address(CONTEXT view, p));
   }
-  using IntensityRow = const float*;
-  FN IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
-    return intensity_address(CONTEXT view, p);
-  }
-  FN float intensity_in_row(IntensityRow row, int dx) { return __ldg(row + dx); }
   template <class Texel>
-  FN Texel* half_pixel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
-    return static_cast<Texel*>(context.views[view].half_pixels) +
-           (p.y * context.views[view].half_pixel_stride + p.x);
+  FN Texel* texel_address(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return static_cast<Texel*>(context.views[view].texels) +
+           (p.y * context.views[view].texel_stride + p.x);
   }
   template <class Texel>
   FN vec4 taps_of(CONTEXT_ARGUMENT int view, ivec2 p) {
-    const Texel* top = half_pixel_address<Texel>(CONTEXT view, p);
-    const Texel* bottom = top + context.views[view].half_pixel_stride;
+    const Texel* top = texel_address<Texel>(CONTEXT view, p);
+    const Texel* bottom = top + context.views[view].texel_stride;
     return vec4(float(__ldg(top)), float(__ldg(top + 1)), float(__ldg(bottom)),
                 float(__ldg(bottom + 1)));
   }
-  FN vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+  FN vec4 texel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
     if (FILTER == FILTER_DEVICE) return taps_of<__half>(CONTEXT view, p);
     return taps_of<float>(CONTEXT view, p);
   }
-  FN float filtered_half_pixel(CONTEXT_ARGUMENT int view, vec2 texel) {
-    return tex2D<float>(context.views[view].texture, texel.x, texel.y);
+  FN float filtered_texel(CONTEXT_ARGUMENT int view, vec2 texel) {
+    return tex2DLod<float>(context.views[view].texture, texel.x, texel.y, 0);
   }
-  FN void store_half_pixel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
+
+  /// Two intensities of a row at a time, of half precision as samples of a source are: dense
+  /// patches keep the data path of the first-level cache busy with little else.
+  static constexpr bool reads_pairs = C::pattern == PATTERN_DENSE && C::window_radius > 0 &&
+                                      C::texels_per_pixel == 1 && C::filter == FILTER_DEVICE;
+  struct PairsOfRow {
+    __half2 pairs[reads_pairs ? C::window_radius + 1 : 1];
+  };
+  using IntensityRow = std::conditional_t<reads_pairs, PairsOfRow, const float*>;
+  FN IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
+    if constexpr (reads_pairs) {
+      // Aligned words, from which an odd column begins half a word later.
+      const auto* words = reinterpret_cast<const unsigned*>(
+          texel_address<__half>(CONTEXT view, ivec2(p.x & ~1, p.y)));
+      const unsigned bits = (p.x & 1) * 16;
+      PairsOfRow row;
+      unsigned word = __ldg(words);
+      UNROLL for (int i = 0; i <= C::window_radius; ++i) {
+        const unsigned next = i < C::window_radius ? __ldg(words + i + 1) : 0;
+        const unsigned pair = __funnelshift_r(word, next, bits);
+        memcpy(&row.pairs[i], &pair, sizeof pair);
+        word = next;
+      }
+      return row;
+    } else {
+      return intensity_address(CONTEXT view, p);
+    }
+  }
+  FN float intensity_in_row(const IntensityRow& row, int dx) {
+    if constexpr (reads_pairs) {
+      const __half2 pair = row.pairs[dx / 2];
+      return dx % 2 == 0 ? __low2float(pair) : __high2float(pair);
+    } else {
+      return __ldg(row + dx);
+    }
+  }
+  FN void store_texel(CONTEXT_ARGUMENT int view, ivec2 p, vec4 taps) {
     if (FILTER == FILTER_DEVICE) {
       const float representable = max(taps.x, LOWEST_HALF);
-      *half_pixel_address<__half>(CONTEXT view, p) = __float2half_rn(representable);
+      *texel_address<__half>(CONTEXT view, p) = __float2half_rn(representable);
     } else {
-      *half_pixel_address<float>(CONTEXT view, p) = taps.x;
+      *texel_address<float>(CONTEXT view, p) = taps.x;
     }
   }
   FN void store_intensity(CONTEXT_ARGUMENT int view, ivec2 p, float intensity) {
@@ -143,8 +178,17 @@ struct Algorithm {
 
   /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
   FN bool thread_pixel(CONTEXT_ARGUMENT int view, ivec2& pixel) {
-    pixel = ivec2(static_cast<int>(blockIdx.x * block_width + threadIdx.x),
-                  static_cast<int>(blockIdx.y * block_height + threadIdx.y) + PASS.first_row);
+    unsigned x = threadIdx.x;
+    unsigned y = threadIdx.y;
+    if constexpr (reads_pairs) {
+      // Texture units take four threads at a time, whose samples lie closer in squares.
+      const unsigned thread = y * block_width + x;
+      const unsigned square = thread / 4;
+      x = 2 * (square % (block_width / 2)) + thread % 2;
+      y = 2 * (square / (block_width / 2)) + thread / 2 % 2;
+    }
+    pixel = ivec2(static_cast<int>(blockIdx.x * block_width + x),
+                  static_cast<int>(blockIdx.y * block_height + y) + PASS.first_row);
     if (PASS.colour >= 0) pixel.x = 2 * pixel.x + ((pixel.y + PASS.colour) & 1);
     const ivec4 size = PARAMETERS.cameras[view].size;
     return pixel.x < size.x && pixel.y < min(PASS.last_row, size.y);
@@ -183,18 +227,21 @@ KernelTable table_of(const KernelEntry (&entries)[count]) {
 
 /// Calls `get`, a callable over a Constants tag, with those of a camera model and a number of
 /// sources. Pairs have instances of their own for each model, more views one for all.
-template <int Radius, int Warp, int Pattern, class Get>
+template <int Radius, int Warp, int Pattern, int Texels, class Get>
 KernelTable for_rig(int camera_model, int source_count, Get get) {
   constexpr int Weighted = 0;
   constexpr int Filter = FILTER_DEVICE;
-  if (source_count != 1) return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1, -1>());
+  if (source_count != 1)
+    return get(Constants<Radius, Warp, Pattern, Weighted, Filter, Texels, -1, -1>());
   switch (camera_model) {
     case CAMERA_KANNALA_BRANDT:
-      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_KANNALA_BRANDT, 1>());
+      return get(
+          Constants<Radius, Warp, Pattern, Weighted, Filter, Texels, CAMERA_KANNALA_BRANDT, 1>());
     case CAMERA_DOUBLE_SPHERE:
-      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, CAMERA_DOUBLE_SPHERE, 1>());
+      return get(
+          Constants<Radius, Warp, Pattern, Weighted, Filter, Texels, CAMERA_DOUBLE_SPHERE, 1>());
     default:
-      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, -1, 1>());
+      return get(Constants<Radius, Warp, Pattern, Weighted, Filter, Texels, -1, 1>());
   }
 }
 

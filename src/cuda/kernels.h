@@ -17,16 +17,16 @@ constexpr int block_height = 8;
 struct ViewMemory {
   const float4* rays;
   float* intensities;  ///< of pixel (0, 0); APRON masked ones surround the image
-  /// Likewise; HALF_PIXEL_APRON masked ones surround them. Of half precision where texture units
-  /// filter, else floats.
-  void* half_pixels;
+  /// Likewise, of pixel (0, 0) at the masked ones of TEXEL_APRON. Of half precision where texture
+  /// units filter, else floats.
+  void* texels;
   cudaTextureObject_t texture;  ///< over the half pixels, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
   float4* checks;
   float4* priors;
   int width;
   int stride;             ///< of the intensities: pixels from row to row
-  int half_pixel_stride;  ///< likewise
+  int texel_stride;  ///< likewise
 };
 
 /// Of LOWEST_HALF.
@@ -40,7 +40,7 @@ struct Context {
   ViewMemory views[MAX_VIEWS];
   uint* transfer_nearest;  ///< of the reference view
   uint* transfer_winner;
-  int camera_model, window_radius, warp, pattern, weighted, filter;
+  int camera_model, window_radius, warp, pattern, weighted, filter, texels_per_pixel;
   int source_count;
 };
 static_assert(sizeof(Context) <= 4096);

@@ -15,11 +15,12 @@ struct Get {
 }  // namespace
 
 KernelTable paper_kernels(int camera_model, int source_count) {
-  return for_rig<paper_window_radius, WARP_EXACT, PATTERN_DENSE>(camera_model, source_count, Get());
+  return for_rig<paper_window_radius, WARP_EXACT, PATTERN_DENSE, 1>(camera_model, source_count,
+                                                                    Get());
 }
 KernelTable affine_paper_kernels(int camera_model, int source_count) {
-  return for_rig<paper_window_radius, WARP_AFFINE, PATTERN_DENSE>(camera_model, source_count,
-                                                                  Get());
+  return for_rig<paper_window_radius, WARP_AFFINE, PATTERN_DENSE, 1>(camera_model, source_count,
+                                                                     Get());
 }
 
 }  // namespace widestereo::kernel::cuda

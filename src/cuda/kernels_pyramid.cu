@@ -20,8 +20,8 @@ struct Get {
 }  // namespace
 
 KernelTable pyramid_kernels(int camera_model, int source_count) {
-  return for_rig<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD>(camera_model,
-                                                                           source_count, Get());
+  return for_rig<pyramid_window_radius, WARP_AFFINE, PATTERN_CHECKERBOARD, 2>(camera_model,
+                                                                              source_count, Get());
 }
 
 }  // namespace widestereo::kernel::cuda

@@ -18,16 +18,16 @@ const void* find(const KernelTable& table, std::string_view name) {
 }
 
 KernelTable specialised_kernels(const KernelConstants& c) {
-  const auto is = [&c](int radius, PatchWarp warp, PatchPattern pattern) {
+  const auto is = [&c](int radius, PatchWarp warp, PatchPattern pattern, int texels_per_pixel) {
     return c.filter == static_cast<int>(Filter::device) && c.window_radius == radius &&
            c.warp == static_cast<int>(warp) && c.pattern == static_cast<int>(pattern) &&
-           c.weighted == 0;
+           c.weighted == 0 && c.texels_per_pixel == texels_per_pixel;
   };
-  if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense))
+  if (is(paper_window_radius, PatchWarp::exact, PatchPattern::dense, 1))
     return paper_kernels(c.camera_model, c.source_count);
-  if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense))
+  if (is(paper_window_radius, PatchWarp::affine, PatchPattern::dense, 1))
     return affine_paper_kernels(c.camera_model, c.source_count);
-  if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard))
+  if (is(pyramid_window_radius, PatchWarp::affine, PatchPattern::checkerboard, 2))
     return pyramid_kernels(c.camera_model, c.source_count);
   return {nullptr, 0};
 }

@@ -39,8 +39,10 @@ class ScheduleProgress {
 inline cv::Size with_apron(cv::Size size) {
   return {size.width + 2 * APRON, size.height + 2 * APRON};
 }
-/// Likewise of its half pixels.
-inline cv::Size size_of_half_pixels(cv::Size size) { return with_apron(size) * 2; }
+/// Likewise of the texels that it is sampled from.
+inline cv::Size size_of_texels(cv::Size size, const KernelConstants& constants) {
+  return with_apron(size) * constants.texels_per_pixel;
+}
 
 /// Patch samples that a slow device of each kind works off in about 100 ms: dispatches of more are
 /// split where a watchdog may end them.

@@ -120,13 +120,15 @@ class Builder {
                     " levels: the coarsest would be less than 2 pixels wide; choose fewer levels.");
       }
     }
-    schedule_.constants = {.camera_model = common_model(),
-                           .window_radius = options.window_radius,
-                           .warp = static_cast<int>(options.warp),
-                           .source_count = views_of_rig_ - 1,
-                           .pattern = static_cast<int>(options.pattern),
-                           .weighted = options.weight_scale > 0 ? 1 : 0,
-                           .filter = static_cast<int>(options.filter)};
+    schedule_.constants = {
+        .camera_model = common_model(),
+        .window_radius = options.window_radius,
+        .warp = static_cast<int>(options.warp),
+        .source_count = views_of_rig_ - 1,
+        .pattern = static_cast<int>(options.pattern),
+        .weighted = options.weight_scale > 0 ? 1 : 0,
+        .filter = static_cast<int>(options.filter),
+        .texels_per_pixel = options.interpolation == Interpolation::cubic ? 2 : 1};
     schedule_.parameters = match_parameters(schedule_.views, views_of_rig_, options);
   }
 
@@ -174,11 +176,9 @@ class Builder {
     return std::move(schedule_);
   }
 
-  /// Sources are read at half pixels; the intensities of this level must be there.
+  /// Sources are sampled from texels; the intensities of this level must be there.
   void interpolate(int level) {
-    kernel::PassParameters pass = pass_of(views_of(level));
-    pass.candidates = options_.interpolation == Interpolation::cubic ? INTERPOLATE_CUBIC : 0;
-    add(Kernel::interpolate, pass, views_of(level), 0);
+    add(Kernel::interpolate, pass_of(views_of(level)), views_of(level), 0);
   }
 
   void build_random() {

@@ -29,6 +29,7 @@ struct KernelConstants {
   int pattern = 0;
   int weighted = 0;
   int filter = 0;
+  int texels_per_pixel = 1;  ///< 2 for cubic interpolation
   bool operator==(const KernelConstants&) const = default;
 };
 

@@ -17,14 +17,16 @@ constexpr int map_row_quadratic = 32;
 constexpr int map_offset_affine = 4;
 constexpr int map_offset_quadratic = 8;
 constexpr int map_axis = 15;
-constexpr int slopes_in_texels = 4;
-constexpr int bends_in_texels = 6;
+constexpr int slopes_to_texels = 4;
+constexpr int bends_to_texels = 6;
 constexpr int map_corners = 9;
 constexpr int weight_of_sample = 7;  // two products, a sum, an eighth power and a division
 constexpr int zncc_cost = 15;        // and the visible share's limit
 
-/// Half pixels; in the memory of texture units they begin elsewhere.
-int texel_at(int filter) { return filter == static_cast<int>(Filter::exact) ? 2 : 4; }
+/// In the memory of texture units texels begin elsewhere.
+int texel_at(const KernelConstants& c) {
+  return (c.texels_per_pixel > 1 ? 2 : 0) + (c.filter == static_cast<int>(Filter::exact) ? 0 : 2);
+}
 
 /// Texture units filter by themselves.
 int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) ? 11 : 0; }
@@ -88,13 +90,14 @@ enum Map : unsigned {
   half_of_planes = 128,     // one colour's
   quarter_of_planes = 256,  // the coarser level's
   finer_intensities = 512,
-  half_pixels = 1024,
+  texels = 1024,
 };
 
-int bytes_of(unsigned maps, int filter) {
-  // Texture units may have half pixels of half precision.
-  const int four_half_pixels = filter == static_cast<int>(Filter::exact) ? 16 : 8;
-  const std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, four_half_pixels};
+int bytes_of(unsigned maps, const KernelConstants& c) {
+  // Texture units may have texels of half precision.
+  const int of_texel = c.filter == static_cast<int>(Filter::exact) ? 4 : 2;
+  const int of_texels = c.texels_per_pixel * c.texels_per_pixel * of_texel;
+  const std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, of_texels};
   int sum = 0;
   for (unsigned i = 0; i < bytes.size(); ++i) {
     if ((maps >> i & 1) != 0) sum += bytes[i];
@@ -112,11 +115,11 @@ Traffic traffic_of(const Dispatch& dispatch) {
   constexpr unsigned seen = ray | intensity;
   switch (dispatch.kernel) {
     case Kernel::initialise:
-      return {seen, half_pixels, plane};
+      return {seen, texels, plane};
     case Kernel::iterate:
-      return {seen | plane, half_pixels, half_of_planes};
+      return {seen | plane, texels, half_of_planes};
     case Kernel::iterate_raster:
-      return {seen | plane, half_pixels, plane};
+      return {seen | plane, texels, plane};
     case Kernel::transfer_clear:
       return {0, 0, nearest | winner};
     case Kernel::transfer_nearest:
@@ -124,42 +127,42 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::transfer_winner:
       return {ray | plane | nearest, 0, winner};
     case Kernel::transfer_gather:
-      return {seen | winner | plane, half_pixels, plane};
+      return {seen | winner | plane, texels, plane};
     case Kernel::check:
-      return {seen | plane, dispatch.samples > 0 ? plane | half_pixels : plane, checks};
+      return {seen | plane, dispatch.samples > 0 ? plane | texels : plane, checks};
     case Kernel::ambiguity:
-      return {seen | plane | checks, half_pixels, checks};
+      return {seen | plane | checks, texels, checks};
     case Kernel::interpolate:
-      return {intensity, 0, half_pixels};
+      return {intensity, 0, texels};
     case Kernel::downsample:
       return {finer_intensities, 0, intensity};
     case Kernel::sweep:
-      return {seen, half_pixels, plane};
+      return {seen, texels, plane};
     case Kernel::upsample:
-      return {seen | quarter_of_planes, half_pixels, plane};
+      return {seen | quarter_of_planes, texels, plane};
     case Kernel::search:
-      return {seen | plane, half_pixels, half_of_planes};
+      return {seen | plane, texels, half_of_planes};
     case Kernel::measure:
-      return {seen | half_pixels | plane, plane, checks};
+      return {seen | texels | plane, plane, checks};
     case Kernel::subpixel:
-      return {seen | half_pixels | plane | checks, half_pixels, checks};
+      return {seen | texels | plane | checks, texels, checks};
     case Kernel::regress:
     case Kernel::vote_normal:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt:
-      return {prior | plane | seen, half_pixels, plane};
+      return {prior | plane | seen, texels, plane};
     case Kernel::adopt_point:
       return {prior | plane | ray | checks, 0, plane | checks};
     case Kernel::fill:
       return {seen | plane | checks, 0, prior};
     case Kernel::adopt_fill:
-      return {prior | checks | seen, half_pixels, plane | checks};
+      return {prior | checks | seen, texels, plane | checks};
     case Kernel::vote:
-      return {seen | plane | checks, half_pixels, prior};
+      return {seen | plane | checks, texels, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
     case Kernel::renew:
-      return {seen | prior, half_pixels, plane};
+      return {seen | prior, texels, plane};
   }
   return {};
 }
@@ -181,6 +184,7 @@ double regression_operations(const Dispatch& dispatch) {
 PatchOperations patch_operations(const KernelConstants& c) {
   const bool exact = c.warp == static_cast<int>(PatchWarp::exact);
   const bool quadratic = c.warp == static_cast<int>(PatchWarp::quadratic);
+  const bool is_scaled = c.texels_per_pixel > 1;
   const int weighting = c.weighted != 0 ? weight_of_sample : 0;
   const int warp_ray = warp_ray_before_projection + projection(c.camera_model);
   const int map_offset = quadratic ? map_offset_quadratic : map_offset_affine;
@@ -188,18 +192,18 @@ PatchOperations patch_operations(const KernelConstants& c) {
   // take a sum and two products more.
   const int sums = 2 + 1 + 8 + (c.weighted != 0 ? 3 : 0);
   PatchOperations operations;
-  operations.of_sample = weighting + (exact ? warp_ray + texel_at(c.filter) : map_offset) +
-                         sample_image(c.filter) + sums;
-  operations.of_patch = side_of_source + warp_through + warp_ray + texel_at(c.filter) +
-                        sample_image(c.filter) + zncc_cost;
+  operations.of_sample =
+      weighting + (exact ? warp_ray + texel_at(c) : map_offset) + sample_image(c.filter) + sums;
+  operations.of_patch =
+      side_of_source + warp_through + warp_ray + texel_at(c) + sample_image(c.filter) + zncc_cost;
   if (!exact) {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;
-    operations.of_patch += anchors * warp_ray + 2 * map_axis + texel_at(c.filter) +
-                           slopes_in_texels +
+    operations.of_patch += anchors * warp_ray + 2 * map_axis + texel_at(c) +
+                           (is_scaled ? slopes_to_texels : 0) +
                            rows * (quadratic ? map_row_quadratic : map_row_affine);
   }
-  if (quadratic) operations.of_patch += map_corners + bends_in_texels;
+  if (quadratic) operations.of_patch += map_corners + (is_scaled ? bends_to_texels : 0);
   return operations;
 }
 
@@ -218,7 +222,7 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
   const auto pixels = static_cast<double>(dispatch.pixels);
   const Traffic traffic = traffic_of(dispatch);
   const int sources = schedule.constants.source_count;
-  const auto bytes = [&](unsigned maps) { return bytes_of(maps, schedule.constants.filter); };
+  const auto bytes = [&](unsigned maps) { return bytes_of(maps, schedule.constants); };
   return {.samples = samples,
           .operations = samples * operations.of_sample + patches * operations.of_patch +
                         pixels * regression_operations(dispatch),
@@ -231,7 +235,7 @@ bool views_are_independent(const Schedule& schedule, const Dispatch& dispatch) {
   const int views_of_level = schedule.constants.source_count + 1;
   const Traffic traffic = traffic_of(dispatch);
   return dispatch.views == views_of_level && (traffic.read_in_sources & plane) == 0 &&
-         (traffic.written & half_pixels) == 0;
+         (traffic.written & texels) == 0;
 }
 
 }  // namespace widestereo

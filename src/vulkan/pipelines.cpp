@@ -107,10 +107,10 @@ void Pipelines::make_layouts(const VulkanContext& context) {
       binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
-      binding(binding_half_pixel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
+      binding(binding_texel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
       binding(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
-      binding(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
   };
   set_layout_ = make_set_layout(context, bindings);
@@ -120,7 +120,7 @@ void Pipelines::make_layouts(const VulkanContext& context) {
 
 Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::string& name,
                                    VkPipelineLayout layout, VkPipelineCache cache) const {
-  static constexpr std::array<VkSpecializationMapEntry, 7> entries = {{
+  static constexpr std::array<VkSpecializationMapEntry, 8> entries = {{
       {0, offsetof(KernelConstants, window_radius), sizeof(int)},
       {1, offsetof(KernelConstants, warp), sizeof(int)},
       {2, offsetof(KernelConstants, camera_model), sizeof(int)},
@@ -128,6 +128,7 @@ Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::stri
       {4, offsetof(KernelConstants, pattern), sizeof(int)},
       {5, offsetof(KernelConstants, weighted), sizeof(int)},
       {6, offsetof(KernelConstants, filter), sizeof(int)},
+      {7, offsetof(KernelConstants, texels_per_pixel), sizeof(int)},
   }};
   const Handle<VkShaderModule> module = make_module(context, sampled_ ? name : name + "_loads");
   const VkSpecializationInfo specialisation = {static_cast<std::uint32_t>(entries.size()),

@@ -16,10 +16,10 @@ enum Binding : std::uint32_t {
   binding_intensities = 1,
   binding_rays = 2,
   binding_hypotheses = 3,
-  binding_half_pixel_texture = 4,
+  binding_texel_texture = 4,
   binding_nearest = 5,
   binding_winner = 6,
-  binding_half_pixels = 7,
+  binding_texels = 7,
   binding_places = 8,
 };
 

@@ -14,9 +14,9 @@ namespace {
 constexpr VkFormat map_format = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
 /// Texels of fewer bytes take texture units fewer cycles.
-constexpr VkFormat format_of_filtered_half_pixels = VK_FORMAT_R16_SFLOAT;
+constexpr VkFormat format_of_filtered_texels = VK_FORMAT_R16_SFLOAT;
 /// Without texture units: each with the neighbours that a bilinear sample reads.
-constexpr VkFormat format_of_loaded_half_pixels = VK_FORMAT_R32G32B32A32_SFLOAT;
+constexpr VkFormat format_of_loaded_texels = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr std::size_t max_bands_per_submission = 256;
 constexpr VkPipelineStageFlags compute_and_transfer =
     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
@@ -157,18 +157,17 @@ void VulkanBackend::make_images(const VulkanContext& context) {
   intensities_ = make_device_buffer(
       context, count * sizeof(float),
       VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the images");
-  const VkFormat format_of_half_pixels = pipelines_.half_precision()
-                                             ? format_of_filtered_half_pixels
-                                         : pipelines_.sampled() ? intensity_format
-                                                                : format_of_loaded_half_pixels;
+  const VkFormat format_of_texels = pipelines_.half_precision() ? format_of_filtered_texels
+                                    : pipelines_.sampled()      ? intensity_format
+                                                                : format_of_loaded_texels;
   const std::span<const cv::Size> sizes = sizes_;
   const auto views = static_cast<std::size_t>(views_of_level());
   for (std::size_t first = 0; first < sizes.size(); first += views) {
-    half_pixels_.push_back(make_image(
-        context, format_of_half_pixels, size_of_half_pixels(largest(sizes.subspan(first, views))),
+    texels_.push_back(make_image(
+        context, format_of_texels, size_of_texels(largest(sizes.subspan(first, views)), constants_),
         views_of_level(),
         VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-        "the images at half pixels"));
+        "the images' texels"));
   }
   rays_ = make_map(1, "the viewing rays");
   hypotheses_ = make_map(map_kinds, "the planes, their priors and the consistency maps");
@@ -185,7 +184,7 @@ void VulkanBackend::make_images(const VulkanContext& context) {
 }
 
 void VulkanBackend::make_descriptor_sets() {
-  const auto levels = static_cast<std::uint32_t>(half_pixels_.size());
+  const auto levels = static_cast<std::uint32_t>(texels_.size());
   const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * levels},
       {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, levels},
@@ -193,12 +192,12 @@ void VulkanBackend::make_descriptor_sets() {
       {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 3 * levels},
   }};
   descriptor_pool_ = make_descriptor_pool(context_, levels, pool_sizes);
-  for (const LayeredImage& half_pixels : half_pixels_) {
-    descriptor_sets_.push_back(make_descriptor_set(half_pixels));
+  for (const LayeredImage& texels : texels_) {
+    descriptor_sets_.push_back(make_descriptor_set(texels));
   }
 }
 
-VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& half_pixels_of_level) {
+VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& texels_of_level) {
   const VkDescriptorSet set =
       allocate_set(context_, descriptor_pool_.get(), pipelines_.set_layout());
   std::vector<VkWriteDescriptorSet> writes;
@@ -221,7 +220,7 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& half_pixe
   };
   const VkDescriptorImageInfo rays = image_info(rays_, VK_NULL_HANDLE);
   const VkDescriptorImageInfo hypotheses = image_info(hypotheses_, VK_NULL_HANDLE);
-  const VkDescriptorImageInfo half_pixels = image_info(half_pixels_of_level, sampler_.get());
+  const VkDescriptorImageInfo texels = image_info(texels_of_level, sampler_.get());
   const VkDescriptorBufferInfo intensities = buffer_info(intensities_);
   const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
   const VkDescriptorBufferInfo places = buffer_info(places_);
@@ -232,9 +231,8 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& half_pixe
   write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &intensities);
   write(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &rays, nullptr);
   write(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &hypotheses, nullptr);
-  write(binding_half_pixel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &half_pixels,
-        nullptr);
-  write(binding_half_pixels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &half_pixels, nullptr);
+  write(binding_texel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &texels, nullptr);
+  write(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &texels, nullptr);
   write(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &nearest);
   write(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &winner);
   context_.vk().vkUpdateDescriptorSets(context_.device(), static_cast<std::uint32_t>(writes.size()),
@@ -261,7 +259,7 @@ void VulkanBackend::start_memory() {
   context_.vk().vkCmdFillBuffer(commands, intensities_.handle.get(), 0, VK_WHOLE_SIZE,
                                 std::bit_cast<std::uint32_t>(MASKED_INTENSITY));
   if (pipelines_.half_precision()) std::fill_n(masked.float32, 4, LOWEST_HALF);
-  for (const LayeredImage& half_pixels : half_pixels_) clear(half_pixels, masked);
+  for (const LayeredImage& texels : texels_) clear(texels, masked);
   clear(rays_, {});
   clear(hypotheses_, {});
 
@@ -371,7 +369,7 @@ cv::Mat VulkanBackend::checks(int view) { return download(checks_of_planes, view
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;
   for (const LayeredImage* image : {&rays_, &hypotheses_}) bytes += image->bytes;
-  for (const LayeredImage& half_pixels : half_pixels_) bytes += half_pixels.bytes;
+  for (const LayeredImage& texels : texels_) bytes += texels.bytes;
   for (const Buffer* buffer :
        {&intensities_, &parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
     bytes += buffer->bytes;

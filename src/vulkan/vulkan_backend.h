@@ -73,7 +73,7 @@ class VulkanBackend final : public Backend {
 
   void make_images(const VulkanContext& context);
   void make_descriptor_sets();
-  VkDescriptorSet make_descriptor_set(const LayeredImage& half_pixels_of_level);
+  VkDescriptorSet make_descriptor_set(const LayeredImage& texels_of_level);
   void start_memory();
   void transition(VkCommandBuffer commands, const LayeredImage& image,
                   const VkImageSubresourceRange& layers, VkImageLayout from,
@@ -95,7 +95,7 @@ class VulkanBackend final : public Backend {
   Atlas map_atlas_;
   Buffer intensities_;
   LayeredImage rays_;
-  std::vector<LayeredImage> half_pixels_;  // of each level
+  std::vector<LayeredImage> texels_;  // of each level
   LayeredImage hypotheses_;                // of each MapKind
   Buffer parameters_;
   Buffer places_;

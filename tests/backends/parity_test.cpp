@@ -105,7 +105,7 @@ TEST_P(Parity, InitialPlanesAndCostsAgree) {
                                      {PatchWarp::affine, Filter::exact},
                                      {PatchWarp::quadratic, Filter::exact},
                                      {PatchWarp::affine, Filter::device}}) {
-    // Texture units round positions to 1/512 pixel, and half pixels have half precision.
+    // Texture units round positions to 1/256 pixel, and texels have half precision.
     const double rounding = filter == Filter::exact ? 1 : 20;
     Options options = small_options();
     options.warp = warp;

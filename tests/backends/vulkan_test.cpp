@@ -349,7 +349,7 @@ TEST(VulkanMatch, SoftwareLoadsTheBitsThatGpusGather) {
     EXPECT_TRUE(same_bits(gathered.cost, loaded.cost));
     EXPECT_TRUE(same_bits(gathered.confidence, loaded.confidence));
   }
-  // Three neighbours more of each half pixel, of two views at three levels.
+  // Three neighbours more of each texel, of two views at three levels.
   double bytes = 0;
   for (const int size : {demo_size, demo_size / 2, demo_size / 4}) {
     bytes += 2 * 12 * std::pow(2 * (size + 2 * APRON), 2);

@@ -105,9 +105,9 @@ inline IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
   return kernel::cpu::intensity_row(context.plain, view, p);
 }
 inline Number intensity_in_row(IntensityRow row, int dx) { return row[dx]; }
-inline vec4 half_pixel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
+inline vec4 texel_taps(CONTEXT_ARGUMENT int view, ivec2 p) {
   counts.texels += 4;
-  return numbers<vec4>(kernel::cpu::half_pixel_taps(context.plain, view, p));
+  return numbers<vec4>(kernel::cpu::texel_taps(context.plain, view, p));
 }
 inline vec4 hypothesis_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return numbers<vec4>(kernel::cpu::hypothesis_at(context.plain, view, p));

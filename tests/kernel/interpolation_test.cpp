@@ -38,9 +38,9 @@ class Interpolated : public ::testing::TestWithParam<Interpolation> {
   /// At a position in pixels; negative where it is not seen.
   float sample(double x, double y) {
     const vec2 position(static_cast<float>(x), static_cast<float>(y));
-    return kernel::cpu::sample_image(fixture_.context(), 0,
-                                     fixture_.context().parameters.cameras[0].size,
-                                     kernel::cpu::texel_at(position, FILTER_EXACT));
+    const kernel::cpu::Context context = fixture_.context();
+    return kernel::cpu::sample_image(context, 0, context.parameters.cameras[0].size,
+                                     kernel::cpu::texel_at(context, position));
   }
 
   double root_mean_square_error(const Function& function) {

@@ -98,7 +98,7 @@ class KernelFixture {
     for (std::size_t i = 0; i < views_.size(); ++i) {
       const View& view = rig_.views[i];
       const cv::Size size(view.camera.width, view.camera.height);
-      views_[i].set_size(size);
+      views_[i].set_size(size, schedule_.constants);
       views_[i].rays = ray_image(view.camera, view.mask);
       cv::Mat image = smooth_noise(size, static_cast<int>(i) + 1);
       cv::Mat usable;
@@ -130,7 +130,7 @@ class KernelFixture {
     return {r[0], r[1], r[2]};
   }
 
-  /// Makes the images' half pixels, as the schedule begins; after every change of an image.
+  /// Makes the images' texels, as the schedule begins; after every change of an image.
   void interpolate() {
     const kernel::PassParameters& pass = schedule_.dispatches.front().pass;
     for (int i = 0; i < static_cast<int>(views_.size()); ++i) {

@@ -41,6 +41,19 @@ counting::Counts run_patch(const Options& options, CameraModel model) {
   return counting::counts;
 }
 
+TEST(Work, OfPositionsInTexelsIsNothingWhereTheseArePixels) {
+  for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
+    KernelConstants constants{.warp = static_cast<int>(warp), .texels_per_pixel = 2};
+    const PatchOperations of_half_pixels = patch_operations(constants);
+    constants.texels_per_pixel = 1;
+    const PatchOperations of_pixels = patch_operations(constants);
+    // Positions of two numbers: the centre's, and each sample's or those of the map.
+    EXPECT_EQ(of_half_pixels.of_sample - of_pixels.of_sample, warp == PatchWarp::exact ? 2 : 0);
+    EXPECT_EQ(of_half_pixels.of_patch - of_pixels.of_patch,
+              warp == PatchWarp::exact ? 2 : (warp == PatchWarp::affine ? 8 : 14));
+  }
+}
+
 TEST(Work, OfAPatchIsWhatRunningItTakes) {
   for (int model = 0; model < camera_models; ++model) {
     for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
@@ -52,12 +65,14 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
           options.weight_scale = weight_scale;
           options.pattern = pattern;
           options.window_radius = 3;
+          options.interpolation = Interpolation::cubic;
           const counting::Counts run = run_patch(options, static_cast<CameraModel>(model));
           const KernelConstants constants{.camera_model = model,
                                           .window_radius = 3,
                                           .warp = static_cast<int>(warp),
                                           .pattern = static_cast<int>(pattern),
-                                          .weighted = weight_scale > 0 ? 1 : 0};
+                                          .weighted = weight_scale > 0 ? 1 : 0,
+                                          .texels_per_pixel = 2};
           const long long samples = kernel::samples_of_patch(3, static_cast<int>(pattern));
           const PatchOperations expected = patch_operations(constants);
           // Two products with the weight, which compilers leave out where it is one.
@@ -171,9 +186,12 @@ TEST(Work, OfAScheduleAddsUp) {
   EXPECT_EQ(work.texels, 4 * work.samples);
   const PatchOperations of = patch_operations(schedule.constants);
   EXPECT_EQ(work.operations, pixels / 2 * 8 * (121 * of.of_sample + of.of_patch));
-  // Rays, the image, the source's half pixels and all planes read, one colour's planes written.
-  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 4 * 2 + 16) + pixels / 2 * 16);
+  // Rays, the image, the source's texels and all planes read, one colour's planes written.
+  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 2 + 16) + pixels / 2 * 16);
   options.filter = Filter::exact;
+  EXPECT_EQ(work_of(make_schedule(fisheye_rig(64), options), iterate).bytes,
+            pixels * (16 + 4 + 4 + 16) + pixels / 2 * 16);
+  options.interpolation = Interpolation::cubic;
   EXPECT_EQ(work_of(make_schedule(fisheye_rig(64), options), iterate).bytes,
             pixels * (16 + 4 + 4 * 4 + 16) + pixels / 2 * 16);
   for (const Dispatch& dispatch : schedule.dispatches) {

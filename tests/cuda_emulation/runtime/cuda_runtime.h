@@ -37,7 +37,7 @@ struct EmulatedTexture {
 
 // As the programming guide defines linear filtering, with weights of eight bits.
 template <class T>
-T tex2D(cudaTextureObject_t object, float x, float y) {
+T tex2DLod(cudaTextureObject_t object, float x, float y, float) {
   const auto& texture = *reinterpret_cast<const EmulatedTexture*>(object);
   const auto split = [](float position, int size, int* texel) {
     const float limited = fminf(fmaxf(position - 0.5f, -1.0f), static_cast<float>(size));
@@ -58,6 +58,10 @@ T tex2D(cudaTextureObject_t object, float x, float y) {
   };
   return (1 - fx) * (1 - fy) * texel(0, 0) + fx * (1 - fy) * texel(1, 0) +
          (1 - fx) * fy * texel(0, 1) + fx * fy * texel(1, 1);
+}
+
+inline unsigned __funnelshift_r(unsigned low, unsigned high, unsigned bits) {
+  return static_cast<unsigned>((static_cast<unsigned long long>(high) << 32 | low) >> bits % 32);
 }
 
 inline unsigned atomicMax(unsigned* address, unsigned value) {
