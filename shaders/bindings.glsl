@@ -89,19 +89,17 @@ vec4 texel_taps(int view, ivec2 p) { return imageLoad(texels, in_texels(view, p)
 // Asked for once, not for each sample.
 vec2 texel_size = 1.0f / vec2(textureSize(texel_texture, 0).xy);
 
-// Texture coordinates of a position in texels of the memory.
-vec3 texel_position(int view, vec2 texel) {
-  return vec3(texel * texel_size, float(layer_of_texels(view)));
-}
-
 vec4 texel_taps(int view, ivec2 p) {
   // The corner that the four texels share lies half a texel from any rounding trouble.
-  vec4 taps = textureGather(texel_texture, texel_position(view, vec2(p + TEXEL_APRON + 1)));
+  vec2 corner = vec2(p + TEXEL_APRON + 1) * texel_size;
+  vec4 taps = textureGather(texel_texture, vec3(corner, float(layer_of_texels(view))));
   return vec4(taps.w, taps.z, taps.x, taps.y);
 }
 
+vec2 filtered_texel_unit() { return texel_size; }
+
 float filtered_texel(int view, vec2 texel) {
-  return textureLod(texel_texture, texel_position(view, texel), 0.0f).x;
+  return textureLod(texel_texture, vec3(texel, float(layer_of_texels(view))), 0.0f).x;
 }
 
 #endif

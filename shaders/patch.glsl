@@ -30,11 +30,27 @@ FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
   return ray.w != 0.0f && intensity_at(CONTEXT REFERENCE, pixel) >= 0.0f;
 }
 
-// Where a position (pixels) lies in what sample_image() reads.
+// A pixel in the coordinates of sample_image().
+FN vec2 texel_scale(CONTEXT_ARGUMENT_ONLY) {
+  float texels = float(TEXELS_PER_PIXEL);
+#ifdef HAS_DEVICE_FILTER
+  if (FILTER == FILTER_DEVICE) return texels * filtered_texel_unit(CONTEXT_ONLY);
+#endif
+  return vec2(texels, texels);
+}
+
+// A displacement (pixels) in those coordinates.
+FN vec2 in_texels(vec2 scale, vec2 displacement) {
+  return vec2(scale.x * displacement.x, scale.y * displacement.y);
+}
+
+// And where a position (pixels) lies.
 FN vec2 texel_at(CONTEXT_ARGUMENT vec2 position) {
-  vec2 texel = float(TEXELS_PER_PIXEL) * position;
-  if (FILTER == FILTER_EXACT) return texel;
-  return texel + vec2(float(TEXEL_APRON) + 0.5f, float(TEXEL_APRON) + 0.5f);
+  vec2 texel = in_texels(texel_scale(CONTEXT_ONLY), position);
+#ifdef HAS_DEVICE_FILTER
+  if (FILTER == FILTER_DEVICE) return texel + (float(TEXEL_APRON) + 0.5f) * filtered_texel_unit(CONTEXT_ONLY);
+#endif
+  return texel;
 }
 
 // Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others, and every image
@@ -194,13 +210,13 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   if (!mapped) return true;
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
   start.map.u0 = texel_at(CONTEXT start.map.u0);
-  float scale = float(TEXELS_PER_PIXEL);
-  start.map.ux = scale * start.map.ux;
-  start.map.uy = scale * start.map.uy;
+  vec2 scale = texel_scale(CONTEXT_ONLY);
+  start.map.ux = in_texels(scale, start.map.ux);
+  start.map.uy = in_texels(scale, start.map.uy);
   if (WARP == WARP_QUADRATIC) {
-    start.map.uxx = scale * start.map.uxx;
-    start.map.uxy = scale * start.map.uxy;
-    start.map.uyy = scale * start.map.uyy;
+    start.map.uxx = in_texels(scale, start.map.uxx);
+    start.map.uxy = in_texels(scale, start.map.uxy);
+    start.map.uyy = in_texels(scale, start.map.uyy);
   }
   return true;
 }

@@ -11,8 +11,9 @@
 //                                           the same, dx pixels to the right of that pixel, from one address for a row
 //   vec4  texel_taps(view, texel)           intensity of a texel (0, 0: pixel 0, 0; 1, 0: a pixel to its right, or half a
 //                                           one, see TEXELS_PER_PIXEL) and of its right, lower and lower right neighbour
-//   float filtered_texel(view, texel)       bilinear, of the texture units, in texels of the memory: pixel (0, 0) has
-//                                           its centre at TEXEL_APRON + 0.5; only with HAS_DEVICE_FILTER
+//   float filtered_texel(view, texel)       bilinear, of the texture units, in coordinates of the memory, of which texels
+//   vec2  filtered_texel_unit()             take so much: the centre of pixel (0, 0) lies at TEXEL_APRON + 0.5 of them;
+//                                           only with HAS_DEVICE_FILTER
 //   void  store_texel(view, texel, vec4)    as texel_taps() reads them, of which memories may keep the first
 //   vec4  hypothesis_at(view, pixel), void store_hypothesis(view, pixel, vec4)
 //   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl;

@@ -53,7 +53,7 @@ class CudaBackend final : public Backend {
   struct ViewMaps {
     DeviceArray<float4> rays, hypotheses, checks, priors;
     DeviceImage intensities, texels;
-    CudaTexture texture;  // of the half pixels; destroyed before them
+    CudaTexture texture;  // of the texels; destroyed before them
   };
   /// Consecutive launches of a kernel; the i-th of a run lies between events_ i and i + 1.
   struct Stretch {

@@ -20,7 +20,7 @@ struct ViewMemory {
   /// Likewise, of pixel (0, 0) at the masked ones of TEXEL_APRON. Of half precision where texture
   /// units filter, else floats.
   void* texels;
-  cudaTextureObject_t texture;  ///< over the half pixels, bilinear; its (0, 0) is in the apron
+  cudaTextureObject_t texture;  ///< over the texels, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
   float4* checks;
   float4* priors;

@@ -7,7 +7,8 @@ namespace {
 struct Get {
   template <class C>
   KernelTable operator()(C) const {
-    static const KernelEntry entries[] = {KERNEL_ENTRY(iterate, C)};
+    static const KernelEntry entries[] = {KERNEL_ENTRY(initialise, C), KERNEL_ENTRY(iterate, C),
+                                          KERNEL_ENTRY(transfer_gather, C), KERNEL_ENTRY(check, C)};
     return table_of(entries);
   }
 };

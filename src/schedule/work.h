@@ -32,7 +32,7 @@ int side_of_fit(int radius, int steps);
 KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch);
 
 /// Whether each view of a dispatch may run as soon as its own dispatches before have: it is over
-/// all views of a level, reads no planes of other views and writes no half pixels, which these
+/// all views of a level, reads no planes of other views and writes no texels, which these
 /// read.
 bool views_are_independent(const Schedule& schedule, const Dispatch& dispatch);
 

@@ -42,7 +42,7 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 /// specialised for constants; all share one descriptor set layout.
 class Pipelines {
  public:
-  /// `sampled`: half pixels are read through the texture units instead of as storage images, which
+  /// `sampled`: texels are read through the texture units instead of as storage images, which
   /// hold them in another format (shaders/bindings.glsl). Those that texture units filter
   /// have half precision where the device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,

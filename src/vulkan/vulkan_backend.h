@@ -21,8 +21,8 @@ namespace widestereo {
 struct VulkanTuning {
   /// Longest dispatch and submission in patch samples, 0 = by device type.
   long long max_samples = 0;
-  /// Reads half pixels through the texture units; unset: everywhere but on CPUs. Without, filtering
-  /// is exact, and half pixels take four times the memory.
+  /// Reads texels through the texture units; unset: everywhere but on CPUs. Without, filtering
+  /// is exact, and texels take four times the memory.
   std::optional<bool> sampled = std::nullopt;
 };
 
