@@ -88,7 +88,7 @@ struct Algorithm {
     if (FILTER == FILTER_DEVICE) return taps_of<__half>(CONTEXT view, p);
     return taps_of<float>(CONTEXT view, p);
   }
-  FN vec2 filtered_texel_unit(CONTEXT_ARGUMENT_ONLY) { return vec2(1.0f, 1.0f); }
+  FN vec2 filtered_texel_unit(const Context&) { return vec2(1.0f, 1.0f); }
   FN float filtered_texel(CONTEXT_ARGUMENT int view, vec2 texel) {
     return tex2DLod<float>(context.views[view].texture, texel.x, texel.y, 0);
   }
