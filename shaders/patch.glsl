@@ -40,13 +40,13 @@ FN vec2 texel_scale(CONTEXT_ARGUMENT_ONLY) {
 }
 
 // A displacement (pixels) in those coordinates.
-FN vec2 in_texels(vec2 scale, vec2 displacement) {
+FN vec2 to_texels(vec2 scale, vec2 displacement) {
   return vec2(scale.x * displacement.x, scale.y * displacement.y);
 }
 
 // And where a position (pixels) lies.
 FN vec2 texel_at(CONTEXT_ARGUMENT vec2 position) {
-  vec2 texel = in_texels(texel_scale(CONTEXT_ONLY), position);
+  vec2 texel = to_texels(texel_scale(CONTEXT_ONLY), position);
 #ifdef HAS_DEVICE_FILTER
   if (FILTER == FILTER_DEVICE) return texel + (float(TEXEL_APRON) + 0.5f) * filtered_texel_unit(CONTEXT_ONLY);
 #endif
@@ -211,12 +211,12 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
   start.map.u0 = texel_at(CONTEXT start.map.u0);
   vec2 scale = texel_scale(CONTEXT_ONLY);
-  start.map.ux = in_texels(scale, start.map.ux);
-  start.map.uy = in_texels(scale, start.map.uy);
+  start.map.ux = to_texels(scale, start.map.ux);
+  start.map.uy = to_texels(scale, start.map.uy);
   if (WARP == WARP_QUADRATIC) {
-    start.map.uxx = in_texels(scale, start.map.uxx);
-    start.map.uxy = in_texels(scale, start.map.uxy);
-    start.map.uyy = in_texels(scale, start.map.uyy);
+    start.map.uxx = to_texels(scale, start.map.uxx);
+    start.map.uxy = to_texels(scale, start.map.uxy);
+    start.map.uyy = to_texels(scale, start.map.uyy);
   }
   return true;
 }

@@ -17,8 +17,8 @@ constexpr int block_height = 8;
 struct ViewMemory {
   const float4* rays;
   float* intensities;  ///< of pixel (0, 0); APRON masked ones surround the image
-  /// Likewise, of pixel (0, 0) at the masked ones of TEXEL_APRON. Of half precision where texture
-  /// units filter, else floats.
+  /// Likewise; TEXEL_APRON masked ones surround them. Of half precision where texture units filter,
+  /// else floats.
   void* texels;
   cudaTextureObject_t texture;  ///< over the texels, bilinear; its (0, 0) is in the apron
   float4* hypotheses;
