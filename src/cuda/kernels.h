@@ -25,7 +25,7 @@ struct ViewMemory {
   float4* checks;
   float4* priors;
   int width;
-  int stride;             ///< of the intensities: pixels from row to row
+  int stride;        ///< of the intensities: pixels from row to row
   int texel_stride;  ///< likewise
 };
 

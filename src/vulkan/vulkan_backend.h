@@ -96,7 +96,7 @@ class VulkanBackend final : public Backend {
   Buffer intensities_;
   LayeredImage rays_;
   std::vector<LayeredImage> texels_;  // of each level
-  LayeredImage hypotheses_;                // of each MapKind
+  LayeredImage hypotheses_;           // of each MapKind
   Buffer parameters_;
   Buffer places_;
   Buffer transfer_nearest_;
