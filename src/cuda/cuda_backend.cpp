@@ -20,11 +20,6 @@ std::size_t area(cv::Size size) {
   return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
 }
 
-/// Texels of fewer bytes collide less in the texture cache, which would bound the search.
-int texel_bytes_of(const KernelConstants& constants) {
-  return constants.filter == static_cast<int>(Filter::device) ? 2 : 4;
-}
-
 /// Parameters may differ: launches read them from device memory.
 bool same_launches(const Schedule& a, const Schedule& b) {
   return a.constants == b.constants &&
@@ -149,7 +144,7 @@ void CudaBackend::make_maps() {
     maps.rays = DeviceArray<float4>(pixels, stream, name, "the viewing rays");
     maps.intensities = DeviceImage(with_apron(size), APRON, sizeof(float), stream, name);
     maps.texels = DeviceImage(size_of_texels(size, constants_), constants_.texels_per_pixel * APRON,
-                              texel_bytes_of(constants_), stream, name);
+                              bytes_of_texel(constants_), stream, name);
     maps.texture = maps.texels.make_texture(name);
     maps.hypotheses = DeviceArray<float4>(pixels, stream, name, "the planes");
     maps.checks = DeviceArray<float4>(pixels, stream, name, "the consistency maps");

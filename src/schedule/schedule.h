@@ -32,6 +32,11 @@ struct KernelConstants {
   int texels_per_pixel = 1;  ///< 2 for cubic interpolation
   bool operator==(const KernelConstants&) const = default;
 };
+/// Texture units have texels of half precision where they can: what is shorter collides less in
+/// their cache.
+inline int bytes_of_texel(const KernelConstants& constants) {
+  return constants.filter == static_cast<int>(Filter::device) ? 2 : 4;
+}
 
 /// One launch over all pixels of a view, or of several, none of which reads what another one's
 /// threads write. Writes of one dispatch are visible to the next.

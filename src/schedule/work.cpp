@@ -94,9 +94,7 @@ enum Map : unsigned {
 };
 
 int bytes_of(unsigned maps, const KernelConstants& c) {
-  // Texture units may have texels of half precision.
-  const int of_texel = c.filter == static_cast<int>(Filter::exact) ? 4 : 2;
-  const int of_texels = c.texels_per_pixel * c.texels_per_pixel * of_texel;
+  const int of_texels = c.texels_per_pixel * c.texels_per_pixel * bytes_of_texel(c);
   const std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, of_texels};
   int sum = 0;
   for (unsigned i = 0; i < bytes.size(); ++i) {
