@@ -8,7 +8,7 @@ FN bool is_ambiguous(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held) {
   float margin = PARAMETERS.support.z;
   vec3 m = vec3(held.x, held.y, held.z);
   float w = dot(m, ray);
-  float speed = speed_in_sources(CONTEXT ray, w);
+  float speed = speed_in_sources(CONTEXT pixel, ray, w);
   if (speed <= 0.0f) return false;
   for (int i = 0; i < PASS.places; ++i) {
     float pixels = float(2 << (i >> 1));

@@ -6,13 +6,10 @@
 #define SUPPORT_RADIUS 20
 #define SUPPORT_STEP 4
 #define SUPPORT_STEP_FOR_VOTE 10
-// Share of the range of inverse distance over which a point's speed is measured, and its inverse (see VELOCITY_STEP).
-#define SPEED_STEP 0.01f
-#define PER_SPEED_STEP 100.0f
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
-// Of the surroundings' mean squared correlation: from a tenth on, their planes count as known from the images.
-#define EVIDENCE_SCALE 10.0f
+// Of the surroundings' mean squared correlation: from a twentieth on, their planes count as known from the images.
+#define EVIDENCE_SCALE 20.0f
 // Differences that tell how intensity curves: a grid of this radius and step, and the pixels between their ends and
 // middles. All lie within an image's apron.
 #define CURVATURE_RADIUS 12
@@ -23,8 +20,6 @@
 #define PER_CERTAIN_CURVATURE 3.3e5f
 // Largest variance that is taken for noise, of two grey levels: more may be fine texture.
 #define LARGEST_NOISE 6e-5f
-// Share of planes that are wrong where intensity does not curve at all.
-#define WRONG_WITHOUT_CURVATURE 0.4f
 
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -90,28 +85,30 @@ FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
   return clamp(PER_CERTAIN_CURVATURE * net, 0.0f, 1.0f);
 }
 
-// Source pixels that the point moves per unit of inverse distance, at its own. Zero at an epipole.
-FN float speed_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
+// Radians that the point's direction turns in the source per unit of inverse distance.
+FN float turn_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
-  CameraParameters camera = PARAMETERS.cameras[source];
-  float range = PARAMETERS.range.w - PARAMETERS.range.z;
-  float step = SPEED_STEP * range;
-  if (w + step > PARAMETERS.range.w) step = -step;
-  vec2 here;
-  vec2 there;
-  int model = model_of(CONTEXT camera);
-  if (!project(camera, model, direction_in_source(pair, ray, w), here)) return 0.0f;
-  if (!project(camera, model, direction_in_source(pair, ray, w + step), there)) return 0.0f;
-  return length(there - here) * (PER_SPEED_STEP / range);
+  vec3 direction = direction_in_source(pair, ray, w);
+  float distance2 = dot(direction, direction);
+  vec3 across = translation(pair) - (dot(translation(pair), direction) / distance2) * direction;
+  return length(across) / sqrt(distance2);
 }
 
-// In the source where it is fastest.
-FN float speed_in_sources(CONTEXT_ARGUMENT vec3 ray, float w) {
+// Source pixels that the point moves per unit of inverse distance, in the source where it is fastest; where it is in no
+// field of view, pixels of the reference. Zero at an epipole.
+FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
   float speed = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) {
-    speed = max(speed, speed_in_source(CONTEXT source_at(CONTEXT i), ray, w));
+    speed = max(speed, length(source_velocity(CONTEXT source_at(CONTEXT i), ray, w)));
   }
-  return speed;
+  if (speed > 0.0f) return speed;
+  float turn = 0.0f;
+  for (int i = 0; i < SOURCE_COUNT; ++i) turn = max(turn, turn_in_source(CONTEXT source_at(CONTEXT i), ray, w));
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  int towards_middle = 2 * pixel.x < size.x ? 1 : -1;
+  vec4 beside = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x + towards_middle, pixel.y)));
+  float angle = length(vec3(beside.x, beside.y, beside.z) - ray);
+  return beside.w != 0.0f && angle > 0.0f ? turn / angle : 0.0f;
 }
 
 // Of the surrounding planes: the share that puts the pixel's point where its own does (x) and EVIDENCE_SCALE times the
@@ -140,15 +137,14 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
 }
 
 // Probability that the point lies within two source pixels of its true place: a logistic model of the
-// displacement from the source's own plane (px), the support of the surroundings and the variance of intensity
-// that the match leaves unexplained, fitted to ray-traced scenes (docs/accuracy.md). Where next to nothing matches
-// around, as in the dark beyond the lens circle, planes agree because nothing contradicts them; on blank walls with
-// gradients of brightness, where everything matches, they agree because they are smooth.
-FN float confidence_of(float displacement, float support, float unexplained, float evidence, float structure) {
-  float log_odds = 1.41f - 0.48f * logarithm(1.0f + 4.0f * displacement) + 1.44f * logarithm(support + 0.02f) -
-                   0.31f * logarithm(unexplained + 1.5e-5f);
-  float known = min(evidence, 1.0f) * (1.0f - WRONG_WITHOUT_CURVATURE * (1.0f - structure));
-  return known / (1.0f + exponential(-log_odds));
+// displacement from the source's own plane (px), the support of the surroundings, the cost and how far intensity curves,
+// fitted to ray-traced scenes (docs/accuracy.md). On blank walls with gradients of brightness, where everything matches,
+// planes agree because they are smooth; where next to nothing matches around, as in the dark beyond the lens circle,
+// because nothing contradicts them.
+FN float confidence_of(float displacement, float support, float cost, float evidence, float structure) {
+  float log_odds = -1.53f + 2.59f * structure - 0.32f * logarithm(1.0f + 16.0f * displacement) -
+                   0.79f * logarithm(1.02f - support) - 0.33f * logarithm(min(cost, 1.0f) + 0.02f);
+  return min(evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
 // What a source shows of the point at inverse distance w, negative where it does not see it.
@@ -175,19 +171,18 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     reasons = REASON_NO_OVERLAP;
   } else {
     float w = dot(m, ray);
-    float speed = speed_in_sources(CONTEXT ray, w);
+    float speed = speed_in_sources(CONTEXT pixel, ray, w);
     for (int i = 0; i < SOURCE_COUNT; ++i) {
       vec2 candidate = difference_from_source(CONTEXT source_at(CONTEXT i), pixel, ray, m);
       if (candidate.y < difference.y) difference = candidate;
     }
     vec4 limits = PARAMETERS.check_limits;
     bool for_vote = (PASS.candidates & CHECK_FOR_VOTE) != 0u;
-    bool needs_variance = !for_vote || PARAMETERS.patch_limits.x > 0.0f;
-    float variance = needs_variance ? reference_variance(CONTEXT pixel) : 0.0f;
     int step = for_vote ? SUPPORT_STEP_FOR_VOTE : SUPPORT_STEP;
     vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed, step);
     bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
-    if (variance < PARAMETERS.patch_limits.x) reasons |= REASON_NO_TEXTURE;
+    float least_variance = PARAMETERS.patch_limits.x;
+    if (least_variance > 0.0f && reference_variance(CONTEXT pixel) < least_variance) reasons |= REASON_NO_TEXTURE;
     if (held.w > limits.z) reasons |= REASON_HIGH_COST;
     if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) reasons |= REASON_LOW_PARALLAX;
     if (w < PARAMETERS.patch_limits.z * length(m)) reasons |= REASON_TILT;
@@ -203,9 +198,8 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       difference.x = float(source);
       confidence = intensity_in_source(CONTEXT source, ray, w);
     } else {
-      confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x,
-                                 variance * min(held.w, 1.0f), support.y,
-                                 structure_of_surroundings(CONTEXT pixel, reference_noise(CONTEXT pixel)));
+      float structure = structure_of_surroundings(CONTEXT pixel, reference_noise(CONTEXT pixel));
+      confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x, held.w, support.y, structure);
     }
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));

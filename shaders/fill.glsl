@@ -59,7 +59,7 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float sum = weights[0];
     while (sum < FAR_SHARE * total && chosen + 1 < count) sum += weights[++chosen];
     float w = dot(planes[chosen], ray);
-    float reach = SURFACE_DISPLACEMENT / max(speed_in_sources(CONTEXT ray, w), 1e-9f);
+    float reach = SURFACE_DISPLACEMENT / max(speed_in_sources(CONTEXT pixel, ray, w), 1e-9f);
     int first = 0;
     while (dot(planes[first], ray) < w - reach) ++first;
     int end = first;
