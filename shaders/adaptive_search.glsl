@@ -17,15 +17,9 @@ FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   vec2 low;
   vec2 high;
   int model = model_of(CONTEXT camera);
-  bool has_low = project(camera, model, direction_in_source(pair, ray, w - step), low);
-  bool has_high = project(camera, model, direction_in_source(pair, ray, w + step), high);
-  if (!(has_low && has_high)) {
-    // Where the field of view ends beside the point.
-    vec2 middle;
-    bool has_one = has_low || has_high;
-    if (!has_one || !project(camera, model, direction_in_source(pair, ray, w), middle)) return vec2(0.0f, 0.0f);
-    if (!has_low) low = 2.0f * middle - high;
-    if (!has_high) high = 2.0f * middle - low;
+  if (!project(camera, model, direction_in_source(pair, ray, w - step), low) ||
+      !project(camera, model, direction_in_source(pair, ray, w + step), high)) {
+    return vec2(0.0f, 0.0f);
   }
   return (HALF_PER_VELOCITY_STEP / range) * (high - low);
 }

@@ -94,8 +94,8 @@ FN float turn_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   return length(across) / sqrt(distance2);
 }
 
-// Source pixels that the point moves per unit of inverse distance, in the source where it is fastest; where it is in no
-// field of view, pixels of the reference. Zero at an epipole.
+// Source pixels that the point moves per unit of inverse distance, in the source where it is fastest; where that leaves
+// all fields of view, pixels of the reference. Zero at an epipole.
 FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
   float speed = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) {
