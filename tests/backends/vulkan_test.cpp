@@ -163,6 +163,7 @@ TEST(VulkanMatch, TextureUnitsFilterAsWellAsTheirPositions) {
   Application application;
   KernelFixture match = small_match();
   keep_first(match.schedule(), Kernel::initialise);  // no choice amplifies rounding
+  match.schedule().constants.texels_per_pixel = 2;   // positions are rounded to 1/512 pixel
   const auto costs = [&](const VulkanContext& context, Filter filter) {
     match.schedule().constants.filter = static_cast<int>(filter);
     VulkanBackend backend(context, sizes_of(match.rig()), match.schedule().constants,
@@ -183,7 +184,7 @@ TEST(VulkanMatch, TextureUnitsFilterAsWellAsTheirPositions) {
     cv::minMaxLoc(difference, nullptr, &largest);
     EXPECT_GT(largest, 0) << "both were filtered alike";
     // Planes have the same bits; costs differ as positions do, and by all where visibility flips.
-    EXPECT_LT(cv::countNonZero(difference > 0.02), 8);
+    EXPECT_LT(cv::countNonZero(difference > 0.02), 4);
   };
   expect_close(exact, floats);
   expect_close(exact, halves);
