@@ -24,18 +24,23 @@ FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   return (HALF_PER_VELOCITY_STEP / range) * (high - low);
 }
 
-// The source that tells most about the pixel's distance, and the movement there: of those that see the point the
+// Whether the source has an intensity where the point lands, which something nearer may hide there.
+FN bool is_unmasked_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
+  ivec2 q;
+  return pixel_in_source(CONTEXT source, ray, w * ray, q) && intensity_at(CONTEXT source, q) >= 0.0f;
+}
+
+// The source that tells most about the pixel's distance, and the movement there: of those in which the point lands the
 // one in which it is fastest.
 FN int telling_source(CONTEXT_ARGUMENT vec3 ray, float w, OUT(vec2) velocity) {
   int chosen = source_at(CONTEXT 0);
   velocity = source_velocity(CONTEXT chosen, ray, w);
   if (SOURCE_COUNT == 1) return chosen;
-  ivec2 q;
-  bool seen = pixel_in_source(CONTEXT chosen, ray, w * ray, q);
+  bool seen = is_unmasked_in_source(CONTEXT chosen, ray, w);
   for (int i = 1; i < SOURCE_COUNT; ++i) {
     int source = source_at(CONTEXT i);
     vec2 v = source_velocity(CONTEXT source, ray, w);
-    bool sees = pixel_in_source(CONTEXT source, ray, w * ray, q);
+    bool sees = is_unmasked_in_source(CONTEXT source, ray, w);
     bool tells_more = sees == seen ? length(v) > length(velocity) : sees;
     if (!tells_more) continue;
     chosen = source;
@@ -140,7 +145,10 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   float w = inverse_distance_of(held, ray);
   if (!is_usable(CONTEXT pixel, usable_ray)) return;
-  if (w <= 0.0f) held = vec4(PARAMETERS.range.z * ray, INVALID_COST);
+  if (w <= 0.0f) {
+    w = PARAMETERS.range.z;
+    held = vec4(w * ray, INVALID_COST);
+  }
   vec2 velocity;
   int source = telling_source(CONTEXT ray, w, velocity);
   float speed = length(velocity);

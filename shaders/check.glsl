@@ -155,8 +155,8 @@ FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
 }
 
 // Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the
-// reasons. With CHECK_FOR_VOTE the source that tells most and what it shows of the point stand for the difference and
-// the confidence, which cost more and are not asked for then.
+// reasons. With CHECK_FOR_VOTE the source that tells most (agreeing_source()) and what it shows of the point stand for the
+// difference and the confidence, which cost more and are not asked for then.
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
@@ -194,7 +194,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
     if (for_vote) {
       vec2 velocity;
-      int source = telling_source(CONTEXT ray, w, velocity);
+      int source = agreeing_source(CONTEXT pixel, ray, m, velocity);
       difference.x = float(source);
       confidence = intensity_in_source(CONTEXT source, ray, w);
     } else {

@@ -46,6 +46,28 @@ FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity,
   return min(min(min(before.z, after.y), min(before.y, after.z)), intensity) >= 0.0f;
 }
 
+// The source that tells most of those whose own planes agree with the pixel's, for the point may be hidden in others; of
+// all where none agrees. `velocity`: the movement there.
+FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2) velocity) {
+  float w = dot(m, ray);
+  int chosen = telling_source(CONTEXT ray, w, velocity);
+  if (SOURCE_COUNT == 1) return chosen;
+  float limit = PARAMETERS.check_limits.y;
+  // Of those in which the point lands it is the fastest, and in others nothing agrees.
+  if (difference_from_source(CONTEXT chosen, pixel, ray, m).y <= limit) return chosen;
+  float fastest = 0.0f;
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    int source = source_at(CONTEXT i);
+    vec2 v = source_velocity(CONTEXT source, ray, w);
+    float speed = length(v);
+    if (speed <= fastest || difference_from_source(CONTEXT source, pixel, ray, m).y > limit) continue;
+    chosen = source;
+    velocity = v;
+    fastest = speed;
+  }
+  return chosen;
+}
+
 // Stores all that regress_pixel() needs of a neighbour: the variance of its match along the epipolar curve (px^2), the
 // speed there (pixels per unit of inverse distance), its inverse distance and intensity. The variance is that of the
 // patch's residual over the information of its gradients, net of what gain and offset of the intensities explain, too,
@@ -63,7 +85,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float w = inverse_distance_of(held, ray);
   if (is_usable(CONTEXT pixel, usable_ray) && correlation > 0.05f) {
     vec2 velocity;
-    int source = telling_source(CONTEXT ray, dot(m, ray), velocity);
+    int source = agreeing_source(CONTEXT pixel, ray, m, velocity);
     speed = length(velocity);
     vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
     vec2 direction = reference_direction(CONTEXT source, pixel, m, along);

@@ -74,7 +74,7 @@ FN void subpixel_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec3 m = vec3(held.x, held.y, held.z);
   if (measure.x >= UNMEASURED_VARIANCE) return;
   vec2 velocity;
-  int source = telling_source(CONTEXT vec3(ray.x, ray.y, ray.z), measure.z, velocity);
+  int source = agreeing_source(CONTEXT pixel, vec3(ray.x, ray.y, ray.z), m, velocity);
   vec2 direction = reference_direction(CONTEXT source, pixel, m, (1.0f / measure.y) * velocity);
   // What a precise patch still asks for is less its noise than a second surface in it.
   float share = measure.x / (measure.x + HALF_SHIFT_VARIANCE);

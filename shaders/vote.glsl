@@ -75,6 +75,19 @@ FN float gain_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
   return gain;
 }
 
+// The source that tells most about the pixel: that of the check, unless the pixel was filled since. `velocity`: the
+// movement there.
+FN int checked_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, OUT(vec2) velocity) {
+  if (SOURCE_COUNT > 1) {
+    vec4 checked = check_at(CONTEXT REFERENCE, pixel);
+    if ((uint(checked.w) & uint(REASON_FILLED)) == 0u) {
+      velocity = source_velocity(CONTEXT int(checked.x), ray, w);
+      return int(checked.x);
+    }
+  }
+  return telling_source(CONTEXT ray, w, velocity);
+}
+
 // Inverse of the mean squared difference of intensity over the middle of the patch, noise included, in units of the
 // darker image. It must not explain a wrong plane by a gain of its own, as a correlation of so few pixels could.
 FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, float gain) {
@@ -116,7 +129,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     ivec4 size = PARAMETERS.cameras[REFERENCE].size;
     float own = inverse_distance_of(held, ray);
     vec2 velocity;
-    int source = telling_source(CONTEXT ray, own, velocity);
+    int source = checked_source(CONTEXT pixel, ray, own, velocity);
     float speed = length(velocity);
     // Places along the epipolar curve, in units of VOTE_DISPLACEMENT.
     float scale = speed / VOTE_DISPLACEMENT;

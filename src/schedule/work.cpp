@@ -109,7 +109,7 @@ struct Traffic {
   unsigned written = 0;
 };
 
-Traffic traffic_of(const Dispatch& dispatch) {
+Traffic traffic_of(const Dispatch& dispatch, int sources) {
   constexpr unsigned seen = ray | intensity;
   switch (dispatch.kernel) {
     case Kernel::initialise:
@@ -143,7 +143,8 @@ Traffic traffic_of(const Dispatch& dispatch) {
     case Kernel::measure:
       return {seen | texels | plane, plane, checks};
     case Kernel::subpixel:
-      return {seen | texels | plane | checks, texels, checks};
+      // Their planes tell which of several sources sees the point.
+      return {seen | texels | plane | checks, sources > 1 ? texels | plane : texels, checks};
     case Kernel::regress:
     case Kernel::vote_normal:
       return {seen | plane | checks, 0, prior};
@@ -218,8 +219,8 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
       samples / static_cast<double>(kernel::samples_of_patch(schedule.constants.window_radius,
                                                              schedule.constants.pattern));
   const auto pixels = static_cast<double>(dispatch.pixels);
-  const Traffic traffic = traffic_of(dispatch);
   const int sources = schedule.constants.source_count;
+  const Traffic traffic = traffic_of(dispatch, sources);
   const auto bytes = [&](unsigned maps) { return bytes_of(maps, schedule.constants); };
   return {.samples = samples,
           .operations = samples * operations.of_sample + patches * operations.of_patch +
@@ -230,9 +231,9 @@ KernelWork work_of(const Schedule& schedule, const Dispatch& dispatch) {
 }
 
 bool views_are_independent(const Schedule& schedule, const Dispatch& dispatch) {
-  const int views_of_level = schedule.constants.source_count + 1;
-  const Traffic traffic = traffic_of(dispatch);
-  return dispatch.views == views_of_level && (traffic.read_in_sources & plane) == 0 &&
+  const int sources = schedule.constants.source_count;
+  const Traffic traffic = traffic_of(dispatch, sources);
+  return dispatch.views == sources + 1 && (traffic.read_in_sources & plane) == 0 &&
          (traffic.written & texels) == 0;
 }
 
