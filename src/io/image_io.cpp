@@ -119,19 +119,37 @@ cv::Mat decode(const fs::path& path) {
   return image;
 }
 
-/// In memory: OpenCV's own writing of files does not notice a full disk.
-void encode(const fs::path& path, const cv::Mat& image, const std::vector<int>& parameters = {}) {
+/// Empty where the extension names no format that takes it.
+std::vector<uchar> encoded(const std::string& extension, const cv::Mat& image,
+                           const std::vector<int>& parameters = {}) {
   std::vector<uchar> bytes;
-  bool encoded = false;
   try {
-    encoded = cv::imencode(path.extension().string(), image, bytes, parameters);
+    if (!cv::imencode(extension, image, bytes, parameters)) bytes.clear();
   } catch (const cv::Exception& error) {
     if (error.code == cv::Error::StsNoMem) throw;
+    bytes.clear();
   }
-  if (!encoded) {
-    throw Error("Cannot write " + path.string() +
-                ": its extension names no format that holds such an image; use .png.");
-  }
+  return bytes;
+}
+
+/// Formats of 8 bits take images of 16, too, but OpenCV cuts off what is above 255.
+bool keeps_depth(const std::string& extension, const cv::Mat& image) {
+  constexpr int side = 64;
+  const cv::Mat part =
+      image(cv::Rect(0, 0, std::min(image.cols, side), std::min(image.rows, side)));
+  const std::vector<uchar> bytes = encoded(extension, part);
+  return !bytes.empty() && cv::imdecode(bytes, cv::IMREAD_UNCHANGED).depth() == image.depth();
+}
+
+[[noreturn]] void refuse_format(const fs::path& path) {
+  throw Error("Cannot write " + path.string() +
+              ": its extension names no format that holds such an image; use .png.");
+}
+
+/// In memory: OpenCV's own writing of files does not notice a full disk.
+void encode(const fs::path& path, const cv::Mat& image, const std::vector<int>& parameters = {}) {
+  const std::vector<uchar> bytes = encoded(path.extension().string(), image, parameters);
+  if (bytes.empty()) refuse_format(path);
   write_file(path, [&](std::ostream& stream) {
     stream.write(reinterpret_cast<const char*>(bytes.data()),
                  static_cast<std::streamsize>(bytes.size()));
@@ -268,6 +286,9 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
   }
 }
 
-void write_image(const fs::path& path, const cv::Mat& image) { encode(path, image); }
+void write_image(const fs::path& path, const cv::Mat& image) {
+  if (image.depth() != CV_8U && !keeps_depth(path.extension().string(), image)) refuse_format(path);
+  encode(path, image);
+}
 
 }  // namespace widestereo

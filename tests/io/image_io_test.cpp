@@ -134,6 +134,24 @@ TEST(Images, KeepTheirDepthAndChannels) {
   }
 }
 
+TEST(Images, Of16BitsGoToFormatsThatHoldThem) {
+  const TemporaryFolder folder;
+  for (const int type : {CV_16UC1, CV_16UC3}) {
+    const cv::Mat image(70, 90, type, cv::Scalar::all(40'000));
+    for (const char* name : {"a.jpg", "a.bmp", "a.JPG", "a.webp"}) {
+      const std::string error = error_of([&] { write_image(folder / name, image); });
+      EXPECT_NE(error.find(name + std::string(": its extension names no format that holds such")),
+                std::string::npos)
+          << error;
+      EXPECT_FALSE(std::filesystem::exists(folder / name));
+    }
+    for (const char* name : {"a.png", "a.tiff", type == CV_16UC1 ? "a.pgm" : "a.ppm"}) {
+      write_image(folder / name, image);
+      EXPECT_EQ(cv::norm(image, read_image(folder / name), cv::NORM_INF), 0) << name;
+    }
+  }
+}
+
 TEST(Images, BecomeIntensities) {
   EXPECT_FLOAT_EQ(to_intensity(cv::Mat(1, 1, CV_8UC1, cv::Scalar(51)), "x").at<float>(0), 0.2f);
   EXPECT_FLOAT_EQ(to_intensity(cv::Mat(1, 1, CV_16UC1, cv::Scalar(13107)), "x").at<float>(0), 0.2f);
