@@ -10,7 +10,9 @@
 #include <opencv2/core/persistence.hpp>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "calibration/formats.h"
 
@@ -54,16 +56,19 @@ class Storage {
     if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
   }
 
-  /// The first of the keys that holds a numeric matrix (or a number), as double; empty if none
-  /// does.
+  /// Those of the top level.
+  std::vector<std::string> keys() const { return file_.root().keys(); }
+
+  /// The first of the keys that holds a numeric matrix (or a list, or a number), as double; empty
+  /// if none does.
   cv::Mat matrix(Keys keys) const {
     for (const char* key : keys) {
       const cv::FileNode node = file_[key];
-      cv::Mat value;
-      if (node.isReal() || node.isInt()) return cv::Mat(1, 1, CV_64F, cv::Scalar(node.real()));
-      if (!node.isMap()) continue;
-      require_small(node, key);
-      node >> value;
+      cv::Mat value = numbers(node);
+      if (node.isMap()) {
+        require_small(node, key);
+        node >> value;
+      }
       if (value.empty() || value.channels() != 1) continue;
       value.convertTo(value, CV_64F);
       if (!cv::checkRange(value)) {
@@ -88,15 +93,28 @@ class Storage {
     const cv::Mat width = matrix({"image_width", "width", "image_Width"});
     const cv::Mat height = matrix({"image_height", "height", "image_Height"});
     if (both.total() == 2) return size_of(both.at<double>(0), both.at<double>(1));
+    if (!both.empty()) refuse_size();
     if (!width.empty() && !height.empty()) {
       return size_of(width.at<double>(0), height.at<double>(0));
     }
-    const cv::FileNode list = file_["image_size"];
-    if (list.isSeq() && list.size() == 2) return size_of(list[0].real(), list[1].real());
     return {};
   }
 
  private:
+  static bool is_number(const cv::FileNode& node) { return node.isReal() || node.isInt(); }
+
+  /// A number, or a list as OpenCV writes a cv::Size, cv::Vec or std::vector; empty otherwise.
+  static cv::Mat numbers(const cv::FileNode& node) {
+    if (is_number(node)) return cv::Mat(1, 1, CV_64F, cv::Scalar(node.real()));
+    std::vector<double> values;
+    if (!node.isSeq()) return {};
+    for (const cv::FileNode& element : node) {
+      if (!is_number(element)) return {};
+      values.push_back(element.real());
+    }
+    return cv::Mat(values, true);
+  }
+
   /// A damaged header must not make OpenCV allocate gigabytes.
   void require_small(const cv::FileNode& node, const char* key) const {
     constexpr double largest_side = 64;
@@ -112,10 +130,12 @@ class Storage {
   cv::Size size_of(double width, double height) const {
     const std::optional<int> columns = whole_number(width);
     const std::optional<int> rows = whole_number(height);
-    if (!columns || !rows) {
-      document_.fail("The image size is not a pair of whole numbers of pixels.");
-    }
+    if (!columns || !rows) refuse_size();
     return {*columns, *rows};
+  }
+
+  [[noreturn]] void refuse_size() const {
+    document_.fail("The image size is not a pair of whole numbers of pixels; correct it.");
   }
 
   const Document& document_;

@@ -6,7 +6,10 @@
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -285,9 +288,38 @@ TEST(OpenCv, RefusesSizesThatAreNotWhole) {
                "image_height", "x");
   for (const std::string& text :
        {replaced(opencv_text, "image_width: 1280", "image_width: 1280.7"),
+        replaced(opencv_text, "image_width: 1280", "imageSize: [ 1280, 960, 3 ]"),
         replaced(opencv_text, "image_height: 960", "image_height: -960"), list}) {
     const std::string error = error_of(folder.write("stereo.yml", text));
     EXPECT_NE(error.find("whole numbers of pixels"), std::string::npos) << error;
+  }
+}
+
+/// As OpenCV writes a cv::Size or a cv::Mat.
+TEST(OpenCv, SizesMayBeListsAndMatricesByEveryName) {
+  const TemporaryFolder folder;
+  const cv::FileStorage stereo(opencv_text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+  for (const char* key : {"image_size", "imageSize", "img_size"}) {
+    for (const char* name : {"stereo.yml", "stereo.xml", "stereo.json"}) {
+      for (const bool is_list : {true, false}) {
+        const auto path = folder / name;
+        {
+          cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
+          for (const char* matrix : {"K1", "D1", "K2", "D2", "R", "T"}) {
+            file << matrix << stereo[matrix].mat();
+          }
+          const cv::Size size(1280, 960);
+          if (is_list) {
+            file << key << size;
+          } else {
+            file << key << cv::Mat(cv::Vec2i(size.width, size.height));
+          }
+        }
+        EXPECT_EQ(read_calibration(path).rig.views[1].camera.height, 960) << key << " " << name;
+        const std::string error = test::error_of([&] { read_calibration(path, {640, 480}); });
+        EXPECT_NE(error.find("for images of 1280x960"), std::string::npos) << error;
+      }
+    }
   }
 }
 
