@@ -148,6 +148,10 @@ struct CameraKeys {
   Keys k, d, xi;
 };
 
+/// Of the first camera, or the only one, and of the second.
+constexpr Keys first_xi = {"xi1", "xi_1", "xi_left", "xi"};
+constexpr Keys second_xi = {"xi2", "xi_2", "xi_right"};
+
 constexpr int kannala_brandt_coefficients = 4;
 
 /// If coefficients that the model lacks were dropped, rays would be wrong without a word.
@@ -155,6 +159,21 @@ void require_zero(const Document& document, const std::string& what, std::span<c
                   const std::string& remedy) {
   if (std::ranges::all_of(excess, [](double value) { return value == 0; })) return;
   document.fail(what + " has non-zero coefficients that are not supported; " + remedy);
+}
+
+/// A camera of cv::omnidir whose xi is overlooked would be taken for one of cv::fisheye.
+void require_known_xi(const Document& document, const Storage& storage) {
+  const auto is_one_of = [](Keys keys, const std::string& key) {
+    return std::find(keys.begin(), keys.end(), key) != keys.end();
+  };
+  for (const std::string& key : storage.keys()) {
+    const std::string start = key.substr(0, 2);
+    if (start != "xi" && start != "Xi" && start != "XI") continue;
+    const bool is_known = is_one_of(first_xi, key) || is_one_of(second_xi, key);
+    if (is_known && storage.matrix({key.c_str()}).total() == 1) continue;
+    document.fail("The xi of a camera must be a number by the name xi, xi1 or xi2; correct " + key +
+                  ".");
+  }
 }
 
 /// A camera's model and its coefficients.
@@ -196,13 +215,16 @@ Camera read_camera(const Document& document, const Storage& storage, const Camer
 }
 
 Eigen::Isometry3d second_from_first(const Storage& storage, const Document& document) {
-  cv::Mat rotation = storage.matrix({"R", "rotation", "R_stereo"});
-  if (rotation.empty()) {
-    const cv::Mat vector = storage.required({"rvec", "om"}, 3, "rotation");
-    cv::Rodrigues(vector.reshape(1, 1).colRange(0, 3).reshape(1, 3), rotation);
-  }
+  // As OpenCV's sample of stereo with cv::omnidir has them.
+  const cv::Mat both = storage.matrix({"extrinsic_parameters"});
+  const auto part = [&](Keys keys, int first, const char* what) {
+    const bool in_both = both.total() == 6 && storage.matrix(keys).empty();
+    return in_both ? both.reshape(1, 1).colRange(first, first + 3)
+                   : storage.required(keys, 3, what);
+  };
+  cv::Mat rotation = part({"R", "rotation", "R_stereo", "rvec", "om"}, 0, "rotation");
   if (rotation.total() == 3) cv::Rodrigues(rotation.clone().reshape(1, 3), rotation);
-  const cv::Mat translation = storage.required({"T", "t", "tvec", "translation"}, 3, "translation");
+  const cv::Mat translation = part({"T", "t", "tvec", "translation"}, 3, "translation");
   if (rotation.rows != 3 || rotation.cols != 3) document.fail("The rotation R must be 3x3.");
   Eigen::Matrix3d r;
   cv::cv2eigen(rotation, r);
@@ -258,23 +280,28 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
                     std::to_string(image_size.width) + "x" + std::to_string(image_size.height) +
                     ".");
     }
+    require_known_xi(document, storage);
     Rig rig;
     rig.views.resize(2);
     rig.views[0].name = "cam0";
     rig.views[1].name = "cam1";
-    rig.views[0].camera = read_camera(document, storage,
-                                      {"cam0",
-                                       {"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
-                                        "camera_matrix_left", "K", "camera_matrix"},
-                                       {"D1", "distCoeffs1", "dist_coeffs_1", "D_left",
-                                        "distortion_left", "D", "distortion_coefficients"},
-                                       {"xi1", "xi_left", "xi"}},
-                                      size);
+    rig.views[0].camera =
+        read_camera(document, storage,
+                    {"cam0",
+                     {"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
+                      "camera_matrix_left", "K", "camera_matrix"},
+                     {"D1", "distCoeffs1", "dist_coeffs_1", "distortion_coefficients_1", "D_left",
+                      "distortion_left", "D", "distortion_coefficients"},
+                     first_xi},
+                    size);
     const bool single = storage
                             .matrix({"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right",
                                      "camera_matrix_right"})
                             .empty();
     if (single) {
+      if (!storage.matrix(second_xi).empty()) {
+        document.fail("It has the second camera's xi without its matrix (K2); add it.");
+      }
       rig.views.pop_back();
       return rig;
     }
@@ -282,8 +309,9 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         document, storage,
         {"cam1",
          {"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
-         {"D2", "distCoeffs2", "dist_coeffs_2", "D_right", "distortion_right"},
-         {"xi2", "xi_right"}},
+         {"D2", "distCoeffs2", "dist_coeffs_2", "distortion_coefficients_2", "D_right",
+          "distortion_right"},
+         second_xi},
         size);
     if ((rig.views[0].camera.model == CameraModel::mei) !=
         (rig.views[1].camera.model == CameraModel::mei)) {

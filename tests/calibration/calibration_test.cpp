@@ -340,6 +340,91 @@ TEST(OpenCv, ReadsOmnidir) {
   EXPECT_EQ(c.p2, -0.002);
 }
 
+/// With the keys of its samples omni_stereo_calibration and omni_calibration, which keep no size.
+class OmnidirSamples : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::function<void(cv::FileStorage&)>& cameras) const {
+    const auto path = folder_ / "out_camera_params.xml";
+    cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
+    file << "nFrames" << 12 << "flags" << 0;
+    cameras(file);
+    file << "rms" << 0.3;
+    return path;
+  }
+  static void write_camera(cv::FileStorage& file, const std::string& suffix, double xi) {
+    file << "camera_matrix" + suffix << cv::Mat(cv::Matx33d(600, 0.5, 320, 0, 601, 240, 0, 0, 1));
+    file << "distortion_coefficients" + suffix << cv::Mat(cv::Matx14d(-0.2, 0.05, 0.001, -0.002));
+    file << "xi" + suffix << xi;
+  }
+  static void expect_camera(const Camera& camera, double xi) {
+    EXPECT_EQ(camera.model, CameraModel::mei);
+    EXPECT_EQ(camera.xi, xi);
+    EXPECT_EQ(camera.k2, 0.05);
+    EXPECT_EQ(camera.skew, 0.5);
+    EXPECT_EQ(camera.width, 640);
+  }
+  const cv::Size size_{640, 480};
+  const TemporaryFolder folder_;
+};
+
+TEST_F(OmnidirSamples, OfPairsAreRead) {
+  const std::vector<std::function<void(cv::FileStorage&)>> motions = {
+      [](cv::FileStorage& file) {
+        file << "extrinsic_parameters" << cv::Mat(cv::Matx<double, 1, 6>(0, 0.1, 0, -0.2, 0, 0));
+      },
+      [](cv::FileStorage& file) {
+        file << "rvec" << cv::Vec3d(0, 0.1, 0) << "tvec" << cv::Vec3d(-0.2, 0, 0);
+      }};
+  for (const auto& motion : motions) {
+    const Rig rig = read_calibration(write([&](cv::FileStorage& file) {
+                                       write_camera(file, "_1", 1.3);
+                                       write_camera(file, "_2", 1.4);
+                                       motion(file);
+                                       file << "extrinsic_parameters_1"
+                                            << cv::Mat::eye(12, 6, CV_64F);
+                                     }),
+                                     size_)
+                        .rig;
+    ASSERT_EQ(rig.views.size(), 2u);
+    expect_camera(rig.views[0].camera, 1.3);
+    expect_camera(rig.views[1].camera, 1.4);
+    // X_2 = R X_1 + T, as stereoCalibrate() composes them.
+    Eigen::Isometry3d second_from_first = Eigen::Isometry3d::Identity();
+    second_from_first.linear() =
+        Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    second_from_first.translation() << -0.2, 0, 0;
+    EXPECT_LT(
+        (rig.views[1].world_from_camera.inverse().matrix() - second_from_first.matrix()).norm(),
+        1e-12);
+  }
+}
+
+TEST_F(OmnidirSamples, OfOneCameraAreRead) {
+  const Rig rig = read_calibration(write([](cv::FileStorage& file) {
+                                     write_camera(file, "", 1.3);
+                                     file << "extrinsic_parameters" << cv::Mat::eye(100, 6, CV_64F);
+                                   }),
+                                   size_)
+                      .rig;
+  ASSERT_EQ(rig.views.size(), 1u);
+  expect_camera(rig.views[0].camera, 1.3);
+}
+
+/// The camera would be taken for one of cv::fisheye.
+TEST_F(OmnidirSamples, NoXiIsOverlooked) {
+  const auto error_with = [&](const std::string& line) {
+    return error_of(folder_.write("stereo.yml", opencv_text + line + "\n"));
+  };
+  for (const char* line : {"xi_l: 1.2", "Xi1: 1.2", "xi_1: high", "xi: [ 1.2, 1.3 ]"}) {
+    const std::string key = std::string(line).substr(0, std::string(line).find(':'));
+    const std::string error = error_with(line);
+    EXPECT_NE(error.find("by the name xi, xi1 or xi2; correct " + key), std::string::npos) << error;
+  }
+  const std::string second = error_of(
+      folder_.write("stereo.yml", replaced(opencv_text, "K2:", "A2:") + "xi1: 1.2\nxi_2: 1.3\n"));
+  EXPECT_NE(second.find("xi without its matrix"), std::string::npos) << second;
+}
+
 TEST(OpenCv, ReadsRationalAndPrismCoefficientsInItsOrder) {
   const TemporaryFolder folder;
   const auto path = folder / "mono.yml";
