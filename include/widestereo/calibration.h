@@ -45,8 +45,9 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
 /// form (skew, k3), or the file cannot be written.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
-/// Writes a Basalt JSON; T_imu_cam of view 0 is the identity where no IMU is known. Throws Error
-/// when there is no camera, one has no Basalt form, or the file cannot be written.
+/// Writes a Basalt JSON; T_imu_cam of view 0 is the identity where no IMU is known, and the IMU's
+/// rate, biases and noise are Basalt's defaults. Throws Error when there is no camera, one has no
+/// Basalt form, or the file cannot be written.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace widestereo

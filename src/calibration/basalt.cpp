@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
+#include <vector>
 
 #include "calibration/formats.h"
 #include "geometry/validation.h"
@@ -25,6 +26,21 @@ constexpr std::pair<const char*, double Camera::*> radtan8_coefficients[] = {
     {"k1", &Camera::k1}, {"k2", &Camera::k2}, {"p1", &Camera::p1}, {"p2", &Camera::p2},
     {"k3", &Camera::k3}, {"k4", &Camera::k4}, {"k5", &Camera::k5}, {"k6", &Camera::k6}};
 constexpr const char* largest_radius_key = "rpmax";
+
+/// What Basalt does not start without, of the IMU and of vignetting: its own defaults, as none of
+/// it is known.
+void add_defaults(Json& value) {
+  const auto three = [](double each) { return Json{each, each, each}; };
+  value["calib_accel_bias"] = std::vector<double>(9);
+  value["calib_gyro_bias"] = std::vector<double>(12);
+  value["imu_update_rate"] = 200.0;
+  value["accel_noise_std"] = three(0.016);
+  value["gyro_noise_std"] = three(0.000282);
+  value["accel_bias_std"] = three(0.001);
+  value["gyro_bias_std"] = three(0.0001);
+  value["cam_time_offset_ns"] = 0;
+  value["vignette"] = Json::array();
+}
 
 double number(const Document& document, const Json& object, const std::string& key) {
   if (!object.is_object() || !object.contains(key) || !object.at(key).is_number()) {
@@ -234,6 +250,7 @@ void write_basalt(const std::filesystem::path& path, const Rig& rig) {
     limits.push_back(view.camera.max_theta * 180 / std::numbers::pi);
     limited = limited || view.camera.max_theta < std::numbers::pi;
   }
+  calibration::add_defaults(value);
   if (limited) value[calibration::max_theta_key] = limits;
   write_text(path, Json{{"value0", value}}.dump(2) + "\n");
 }

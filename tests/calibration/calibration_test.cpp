@@ -566,6 +566,30 @@ TEST(Writing, RoundTripsExactly) {
   }
 }
 
+/// Of names that it looks for, Basalt refuses a file that lacks one.
+TEST(Writing, BasaltFindsWhatItAsksFor) {
+  const TemporaryFolder folder;
+  write_basalt(folder / "a.json", read_calibration(folder.write("c.yaml", kalibr_text)).rig);
+  std::ifstream stream(folder / "a.json");
+  const auto value = nlohmann::json::parse(stream).at("value0");
+  const std::map<std::string, std::size_t> lists = {
+      {"T_imu_cam", 2},       {"intrinsics", 2},       {"resolution", 2},
+      {"vignette", 0},        {"calib_accel_bias", 9}, {"calib_gyro_bias", 12},
+      {"accel_noise_std", 3}, {"gyro_noise_std", 3},   {"accel_bias_std", 3},
+      {"gyro_bias_std", 3}};
+  for (const auto& [key, size] : lists) {
+    ASSERT_TRUE(value.contains(key)) << key;
+    EXPECT_TRUE(value[key].is_array()) << key;
+    EXPECT_EQ(value[key].size(), size) << key;
+  }
+  for (const char* key : {"accel_noise_std", "gyro_noise_std", "accel_bias_std", "gyro_bias_std"}) {
+    for (const auto& deviation : value[key])
+      EXPECT_GT(deviation, 0) << key << ", by which it divides";
+  }
+  EXPECT_TRUE(value.value("cam_time_offset_ns", nlohmann::json()).is_number_integer());
+  EXPECT_GT(value.value("imu_update_rate", 0.0), 0);
+}
+
 TEST(Writing, PanoramasGoToKalibrAlone) {
   const TemporaryFolder folder;
   Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
