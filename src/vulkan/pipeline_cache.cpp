@@ -40,7 +40,7 @@ bool made_by(const std::vector<char>& data, const VkPhysicalDeviceProperties& de
          std::memcmp(header.pipelineCacheUUID, device.pipelineCacheUUID, VK_UUID_SIZE) == 0;
 }
 
-/// Of a file that begins as ours do.
+/// Of a file that begins as ours do, though it may end within the header.
 std::optional<FileHeader> header_of(const std::filesystem::path& path) {
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(path, ignored)) return std::nullopt;
@@ -64,9 +64,10 @@ std::vector<char> read_cache(const std::filesystem::path& path,
                              const VkPhysicalDeviceProperties& device) {
   const std::optional<FileHeader> header = header_of(path);
   std::error_code error;
-  if (!header || std::filesystem::file_size(path, error) != sizeof *header + header->bytes) {
-    return {};
-  }
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  const bool is_whole =
+      header && !error && size >= sizeof *header && size - sizeof *header == header->bytes;
+  if (!is_whole) return {};
   std::vector<char> data(header->bytes);
   std::ifstream file(path, std::ios::binary);
   file.seekg(sizeof *header);

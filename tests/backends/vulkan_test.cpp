@@ -526,8 +526,11 @@ TEST_F(VulkanCache, DamagedFilesAreIgnoredAndReplaced) {
   const std::string intact = content();
   std::string flipped = intact;
   flipped.back() = static_cast<char>(flipped.back() ^ 1);
-  const std::vector<std::string> damaged = {
-      "", intact.substr(0, 9), intact.substr(0, intact.size() - 1), intact + "x", flipped};
+  // 16 bytes: as many as the number in them and the 24 of a whole header add up to by overflow.
+  const std::string overflowing = intact.substr(0, 8) + "\xf8" + std::string(7, '\xff');
+  const std::vector<std::string> damaged = {"",           intact.substr(0, 9),
+                                            overflowing,  intact.substr(0, intact.size() - 1),
+                                            intact + "x", flipped};
   for (const std::string& content_before : damaged) {
     overwrite(content_before);
     EXPECT_FALSE(is_used());
