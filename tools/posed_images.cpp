@@ -34,7 +34,7 @@ cv::Mat PosedImages::read(std::size_t image) const {
 void PosedImageSettings::add_to(CLI::App& command) {
   command
       .add_option("images", images,
-                  std::string("Folder that the names of the images in a COLMAP model or "
+                  std::string("Folder that the paths of the images in a COLMAP model or "
                               "transforms.json begin in; or a data "
                               "set: ") +
                       FrameSettings::layouts)
@@ -82,13 +82,12 @@ PosedImages PosedImageSettings::of_model() const {
   posed.in_metres = false;
   Images all;
   for (std::size_t i = 0; i < model->names().size(); ++i) {
-    posed.files.push_back(fs::path(images) / model->names()[i]);
+    posed.files.push_back(model->file_of(i, images));
     if (!fs::exists(posed.files.back())) {
       throw ws::Error(posed.files.back().string() +
-                      " is missing; give the folder that the names of "
-                      "the " +
+                      " is missing; give the folder that the paths of the " +
                       std::to_string(model->names().size()) + " images in " + rig.calibration +
-                      " begin in.");
+                      " begin in, or correct them.");
     }
     ws::Rig one = model->calibrated({i}).rig;
     rig.limit_fields_of_view(one);

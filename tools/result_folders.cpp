@@ -31,8 +31,8 @@ std::string first_difference(const Json& there, const Json& now) {
   return path.to_string().substr(1) + " is " + value(a) + " there and " + value(b) + " now";
 }
 
-/// Results are named by files of the data set, so they lie within the folder; a record that someone
-/// edited may say otherwise.
+/// What is written, and removed, by a result's name must not be the data set, nor anything else
+/// outside; a record that someone edited may name it.
 bool is_within_folder(const fs::path& name) {
   return !name.empty() && name.is_relative() &&
          std::none_of(name.begin(), name.end(), [](const fs::path& component) {
@@ -135,6 +135,10 @@ void ResultFolders::remove(const std::string& name) const {
 
 void ResultFolders::add(const std::string& name,
                         const std::function<Json(const fs::path&)>& write) {
+  if (!is_within_folder(name)) {
+    throw ws::Error("A result named " + name + " would not lie within " + folder_.string() +
+                    "; rename its images.");
+  }
   const fs::path temporary = folder_ / unfinished_result;
   fs::remove_all(temporary);
   ws::prepare_output_folder(temporary);

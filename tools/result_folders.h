@@ -50,7 +50,7 @@ class ResultFolders {
 
   /// Adds a result: `write` fills the folder that it is given, with that origin, and returns the
   /// record, which has the name. The result appears when all of it is there. Throws Error where
-  /// something else has the name.
+  /// something else has the name, or where it leads out of the folder.
   void add(const std::string& name, const std::function<Json(const std::filesystem::path&)>& write);
 
   /// Notes something of the whole run in the record.

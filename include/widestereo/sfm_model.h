@@ -40,7 +40,13 @@ class SfmModel {
   SfmModel(SfmModel&&) noexcept;
   SfmModel& operator=(SfmModel&&) noexcept;
 
+  /// The images' paths in the model without their roots and leading "..", which no two share, so
+  /// that they will do as names within a folder of results.
   const std::vector<std::string>& names() const;
+
+  /// Where an image lies, by its path in the model, which begins in `folder`. Throws Error for
+  /// numbers of no image.
+  std::filesystem::path file_of(std::size_t image, const std::filesystem::path& folder) const;
 
   /// The image whose name is the end of a file's path; the longest such name where there are
   /// several. Throws Error where there is none.

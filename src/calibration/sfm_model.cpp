@@ -36,12 +36,22 @@ std::size_t shared_end(const fs::path& path, const fs::path& name) {
   return is_end ? end.size() : 0;
 }
 
+/// An image's path in a model without its root, and without the ".." that lead out of the folder of
+/// images: what is named so lies within any folder.
+std::string name_of(const fs::path& path) {
+  fs::path name;
+  for (const fs::path& component : path.lexically_normal().relative_path()) {
+    if (component != "..") name /= component;
+  }
+  return name.generic_string();
+}
+
 fs::path whole_path(const fs::path& file) { return fs::absolute(file).lexically_normal(); }
 
 /// What is left of an image's file without its name in the model.
 fs::path folder_of_images(const fs::path& file, const fs::path& name) {
   fs::path folder = whole_path(file);
-  for (std::size_t i = shared_end(folder, name.lexically_normal()); i > 0; --i) {
+  for (std::size_t i = shared_end(folder, name); i > 0; --i) {
     folder = folder.parent_path();
   }
   return folder;
@@ -93,9 +103,7 @@ class SfmModel::Implementation {
       cameras_ = cameras_of(cameras_file_);
       images_ = images_of(images_file_);
     }
-    std::stable_sort(images_.begin(), images_.end(),
-                     [](const ColmapImage& a, const ColmapImage& b) { return a.name < b.name; });
-    for (const ColmapImage& image : images_) names_.push_back(image.name);
+    name_images();
     read_points();
   }
 
@@ -105,11 +113,15 @@ class SfmModel::Implementation {
 
   const std::vector<std::string>& names() const { return names_; }
 
+  fs::path file_of(std::size_t number, const fs::path& folder) const {
+    return folder / image_at(number).name;
+  }
+
   std::size_t image_of(const fs::path& file) const {
     const fs::path path = whole_path(file);
     std::size_t longest = 0, found = 0;
     for (std::size_t i = 0; i < names_.size(); ++i) {
-      const std::size_t components = shared_end(path, fs::path(names_[i]).lexically_normal());
+      const std::size_t components = shared_end(path, names_[i]);
       if (components <= longest) continue;
       longest = components;
       found = i;
@@ -132,7 +144,7 @@ class SfmModel::Implementation {
                     ", which took " + image.name + "; is the model complete?");
       }
       View& view = calibrated.rig.views.emplace_back();
-      view.name = image.name;
+      view.name = names_[number];
       view.camera = camera_of(camera->second, cameras_file_.string());
       view.world_from_camera = image.camera_from_world.inverse();
       if (image.mask.empty()) continue;
@@ -166,6 +178,26 @@ class SfmModel::Implementation {
     return images_[number];
   }
 
+  void name_images() {
+    std::map<std::string, ColmapImage> named;
+    for (ColmapImage& image : std::exchange(images_, {})) {
+      const std::string name = name_of(image.name);
+      if (name == "." || !fs::path(name).has_filename()) {
+        throw Error(images_file_.string() + " has an image \"" + image.name +
+                    "\", which is no file's path; correct it.");
+      }
+      const auto [other, is_new] = named.try_emplace(name, std::move(image));
+      if (!is_new) {
+        throw Error(images_file_.string() + " has two images whose name is " + name + ": " +
+                    other->second.name + " and " + image.name + "; rename or remove one.");
+      }
+    }
+    for (auto& [name, image] : named) {
+      names_.push_back(name);
+      images_.push_back(std::move(image));
+    }
+  }
+
   void read_points() {
     std::vector<Eigen::Vector3d> centres;
     for (const ColmapImage& image : images_) {
@@ -191,7 +223,7 @@ class SfmModel::Implementation {
 
   fs::path path_, cameras_file_, images_file_;
   std::map<std::uint64_t, ColmapCamera> cameras_;
-  std::vector<ColmapImage> images_;  // in the order of names
+  std::vector<ColmapImage> images_;  // in the order of names_, by their paths
   std::vector<std::string> names_;
   std::unordered_map<std::uint64_t, Eigen::Vector3d> positions_;  // of points
   ViewSelection selection_{{}, {}};
@@ -204,6 +236,10 @@ SfmModel::SfmModel(SfmModel&&) noexcept = default;
 SfmModel& SfmModel::operator=(SfmModel&&) noexcept = default;
 
 const std::vector<std::string>& SfmModel::names() const { return implementation_->names(); }
+
+fs::path SfmModel::file_of(std::size_t image, const fs::path& folder) const {
+  return implementation_->file_of(image, folder);
+}
 
 std::size_t SfmModel::image_of(const fs::path& file) const {
   return implementation_->image_of(file);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include "widestereo/sfm_model.h"
-
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -11,6 +9,7 @@
 #include "error_of.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
+#include "widestereo/sfm_model.h"
 
 namespace widestereo {
 namespace {
@@ -249,6 +248,21 @@ TEST_F(Colmap, RangeCoversTheDistancesOfObservedPoints) {
   EXPECT_FALSE(read({"a.png"}).distances);  // one point
 }
 
+TEST_F(Colmap, NamesAreOfFilesWithinAFolder) {
+  const auto names = [this](const std::string& path) {
+    write_text(cameras_text, "4 1 0 0 0 0 0 0 7 " + path + "\n\n9 1 0 0 0 -1 0 0 1 a.png\n");
+    return SfmModel(folder_.path()).names();
+  };
+  EXPECT_EQ(names("./right//b.png"), (std::vector<std::string>{"a.png", "right/b.png"}));
+  EXPECT_EQ(names("/data/b.png"), (std::vector<std::string>{"a.png", "data/b.png"}));
+  for (const char* path : {".", "..", "/", "b/.."}) {
+    const std::string message = test::error_of([&] { names(path); });
+    EXPECT_NE(message.find("images.txt has an image \"" + std::string(path) + "\", which is no"),
+              std::string::npos)
+        << path << " " << message;
+  }
+}
+
 /// Points 10 in front of the camera of left/a.png. Of the others, "near" is 0.03 beside it, "far"
 /// 0.9 and "few" too; "none" sees other points.
 TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {
@@ -396,7 +410,9 @@ TEST_F(Colmap, NumbersOfNoImageAreErrors) {
   write_text();
   const SfmModel model(folder_.path());
   const std::string expected = folder_.path().string() + " has no image number 3 among its 3";
-  for (const std::string& message : {test::error_of([&] { model.calibrated({0, 3}); }),
+  for (const std::string& message : {test::error_of([&] {
+                                       model.calibrated({0, 3});
+                                     }),
                                      test::error_of([&] { model.distances({3}); })}) {
     EXPECT_NE(message.find(expected), std::string::npos) << message;
   }

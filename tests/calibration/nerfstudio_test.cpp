@@ -135,6 +135,36 @@ TEST_F(Nerfstudio, FramesMayHaveTheirOwnCamerasAndMasks) {
   EXPECT_FALSE(model.calibrated({0}).in_metres);
 }
 
+/// Names are those of folders of results, too.
+TEST_F(Nerfstudio, ImagesMayLieOutsideOfTheFolder) {
+  const SfmModel model =
+      this->model(file(fisheye, frame("../images/1.png") + ", " + frame("/data/2.png") + ", " +
+                                    frame("a/../3.png")));
+  EXPECT_EQ(model.names(), (std::vector<std::string>{"3.png", "data/2.png", "images/1.png"}));
+  EXPECT_EQ(model.file_of(0, "folder"), "folder/3.png");
+  EXPECT_EQ(model.file_of(1, "folder"), "/data/2.png");
+  EXPECT_EQ(model.file_of(2, "folder"), "folder/../images/1.png");
+  EXPECT_THROW(model.file_of(3, "folder"), Error);
+  EXPECT_EQ(model.image_of("/data/2.png"), 1u);
+  EXPECT_EQ(model.image_of("elsewhere/images/1.png"), 2u);
+  EXPECT_EQ(model.calibrated({2}).rig.views[0].name, "images/1.png");
+}
+
+TEST_F(Nerfstudio, NoTwoImagesHaveOneName) {
+  const auto error_with = [this](const std::string& first, const std::string& second) {
+    return error(file(fisheye, frame(first) + ", " + frame(second)));
+  };
+  const auto expect = [](const std::string& error, const std::string& paths) {
+    EXPECT_NE(error.find("transforms.json has two images whose name is " + paths),
+              std::string::npos)
+        << error;
+  };
+  expect(error_with("images/1.png", "../images/1.png"),
+         "images/1.png: images/1.png and ../images/1.png;");
+  expect(error_with("/a/1.png", "a/1.png"), "a/1.png: /a/1.png and a/1.png;");
+  expect(error_with("1.png", "1.png"), "1.png: 1.png and 1.png;");
+}
+
 TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
   const auto expect = [this](const std::string& text, const std::string& what) {
     const std::string message = error(text);

@@ -318,21 +318,31 @@ TEST_F(ReconstructCommand, OneEndOfTheRangeWillDo) {
 }
 
 /// Where no points tell which images see the same, poses and the range do.
-TEST_F(ReconstructCommand, TakesATransformsFile) {
-  const auto frame = [](const std::string& name, const std::string& x) {
-    return R"({"file_path": ")" + name + R"(", "transform_matrix": [[1, 0, 0, )" + x +
-           "], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]}";
-  };
-  folder_.write("images/transforms.json",
-                R"({"camera_model": "OPENCV_FISHEYE", "w": 96, "h": 96, "fl_x": 30, "fl_y": 31,
-                    "cx": 48, "cy": 48.5, "k1": 0.01, "k2": -0.002, "frames": [)" +
-                    frame("left.png", "0") + ", " + frame("right/1.png", "0.1") + "]}");
-  const std::string range = "--min-distance 0.75 --max-distance 5 ";
+class TransformsCommand : public ReconstructCommand {
+ protected:
+  /// Of the pair, by the paths of its images.
+  void write_transforms(const std::string& name, const std::string& left,
+                        const std::string& right) {
+    const auto frame = [](const std::string& path, const std::string& x) {
+      return R"({"file_path": ")" + path + R"(", "transform_matrix": [[1, 0, 0, )" + x +
+             "], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]}";
+    };
+    folder_.write(name, R"({"camera_model": "OPENCV_FISHEYE", "w": 96, "h": 96, "fl_x": 30,
+                            "fl_y": 31, "cx": 48, "cy": 48.5, "k1": 0.01, "k2": -0.002, "frames": [)" +
+                            frame(left, "0") + ", " + frame(right, "0.1") + "]}");
+  }
+  std::string reconstruct_with(const std::string& transforms) const {
+    std::string arguments = reconstruct();
+    const std::string model = file("model");
+    return arguments.replace(arguments.find(model), model.size(), file(transforms));
+  }
+  static constexpr const char* range = "--min-distance 0.75 --max-distance 5 ";
+};
+
+TEST_F(TransformsCommand, TakesATransformsFile) {
+  write_transforms("images/transforms.json", "left.png", "right/1.png");
   ASSERT_EQ(run(reconstruct("colmap") + range).exit_code, 0);
-  std::string with_transforms = reconstruct();
-  const std::string model = file("model");
-  with_transforms.replace(with_transforms.find(model), model.size(),
-                          file("images/transforms.json"));
+  const std::string with_transforms = reconstruct_with("images/transforms.json");
   expect_error(with_transforms, "give --min-distance and --max-distance");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
   const Outcome outcome = run(with_transforms + range);
@@ -345,6 +355,37 @@ TEST_F(ReconstructCommand, TakesATransformsFile) {
   EXPECT_EQ(record_of("out/left.png")["conventions"]["unit"], "that of the reconstruction");
   expect_error("calibration show " + file("images/transforms.json"),
                "is a COLMAP model or transforms.json");
+}
+
+/// Results of such images lie in the output's folder, and nowhere else.
+TEST_F(TransformsCommand, ImagesMayLieOutsideOfTheFolder) {
+  std::filesystem::create_directories(folder_ / "scene");
+  const std::string source = bytes_of("images/left.png");
+  const std::string absolute = file("images/left.png");
+  write_transforms("scene/transforms.json", absolute, "../images/right/1.png");
+  std::string arguments = reconstruct_with("scene/transforms.json") + range;
+  const std::string images = file("images") + " ";
+  arguments.replace(arguments.find(images), images.size(), file("scene") + " ");
+  const Outcome outcome = run(arguments);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / ("out" + absolute + "/result.json")));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/images/right/1.png/result.json"));
+  EXPECT_TRUE(bytes_of("images/left.png") == source);
+  EXPECT_FALSE(std::filesystem::is_directory(folder_ / "images/right/1.png"));
+  const std::string written = bytes_of("out/images/right/1.png/result.json");
+  ASSERT_EQ(run(arguments).exit_code, 0);
+  EXPECT_TRUE(bytes_of("out/images/right/1.png/result.json") == written);
+
+  // In the order of names.
+  const std::string pair =
+      file("images/right/1.png") + " " + absolute + " -c " + file("scene/transforms.json") + " ";
+  const Outcome checked = run("calibration check " + pair);
+  EXPECT_EQ(checked.output.find("no image whose name"), std::string::npos) << checked.output;
+  const Outcome depth = run("depth " + pair + range + "-o " + file("pair") +
+                            " --preset paper --device cpu --iterations 2 --second-iterations 1"
+                            " --window-radius 2");
+  ASSERT_EQ(depth.exit_code, 0) << depth.output;
+  EXPECT_EQ(cv::norm(distance_in("out/images/right/1.png"), distance_in("pair"), cv::NORM_INF), 0);
 }
 
 TEST_F(ReconstructCommand, FoldersOfOthersAreLeftAlone) {
