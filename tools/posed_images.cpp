@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "matching_run.h"
+#include "progress_bar.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -60,9 +61,11 @@ PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   if (posed.selection == nullptr) {
     const ws::CalibratedImages without_points{.rig = {}, .in_metres = posed.in_metres};
     const ws::Options options = with_range(settings, without_points, rig.calibration).options();
+    ProgressBar bar("Looking for images that see the same");
     posed.selection = std::make_shared<const ws::ViewSelection>(
         centres_of(posed.views),
-        ws::assumed_points(posed.views, options.min_distance, options.max_distance));
+        ws::assumed_points(posed.views, options.min_distance, options.max_distance,
+                           [&bar](double share) { bar.show(share); }));
   }
   return posed;
 }
@@ -96,9 +99,13 @@ PosedImages PosedImageSettings::of_model() const {
   }
   posed.origin = move_near_origin(posed.calibrated);
   if (model->has_points()) posed.selection = {model, &model->selection()};
-  posed.distances = [model, all](const Images& some) {
-    const auto distances = model->distances(some);
-    return distances ? distances : model->distances(all);
+  using Distances = std::optional<ws::DistanceRange>;
+  posed.distances = [model, all, of_all = std::optional<Distances>()](const Images& some) mutable {
+    const Distances distances = model->distances(some);
+    if (distances) return distances;
+    // Many groups may have few points, and all images have many.
+    if (!of_all) of_all = model->distances(all);
+    return *of_all;
   };
   return posed;
 }

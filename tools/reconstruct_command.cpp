@@ -70,7 +70,9 @@ std::vector<Images> groups_of(const PosedImages& images, const ReconstructArgume
     Images& group = groups.emplace_back(all);
     std::iota(group.begin(), group.end(), 0);
   } else {
-    groups = images.selection->groups(1 + sources_of(arguments));
+    ProgressBar bar("Grouping images that see the same");
+    groups = images.selection->groups(1 + sources_of(arguments),
+                                      [&bar](double share) { bar.show(share); });
   }
   const std::size_t matched = all - alone_in(groups);
   if (matched == 0) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <set>
@@ -59,6 +61,44 @@ TEST(AssumedPoints, AreNotSeenThroughMasks) {
   }
   EXPECT_EQ(shared, of_second);  // the first view sees all that the second one does
   EXPECT_EQ(of_second, 2 * 32 * 4U);
+}
+
+/// Otherwise work would grow with the cube of the number of views.
+TEST(AssumedPoints, AreListedForAFewViewsThatSuit) {
+  std::vector<View> views;
+  for (int i = 0; i < 150; ++i) views.push_back(view_at(0.02 * i));
+  std::vector<std::size_t> listed(views.size());
+  double last = 0;
+  for (const ObservedPoint& point :
+       assumed_points(views, 3.3, 3.5, [&last](double share) { last = share; })) {
+    ASSERT_LE(point.observers.size(), 64U);
+    EXPECT_TRUE(std::is_sorted(point.observers.begin(), point.observers.end()));
+    for (const std::size_t observer : point.observers) {
+      ++listed[observer];
+      const View& view = views[observer];
+      EXPECT_GT((view.world_from_camera.inverse() * point.position).z(), 0);
+    }
+  }
+  EXPECT_EQ(last, 1);
+  // By the points on their own rays, at least.
+  EXPECT_GE(*std::min_element(listed.begin(), listed.end()), 4 * 4 * 4U);
+}
+
+/// The nearest ones tell no distances.
+TEST(ViewSelection, ViewsOfACameraThatStoodStillAreMatchedWithOthers) {
+  std::vector<View> views;
+  for (int i = 0; i < 100; ++i) views.push_back(view_at(1e-5 * i));
+  for (int i = 1; i <= 40; ++i) views.push_back(view_at(0.02 * i));
+  std::vector<Eigen::Vector3d> centres;
+  for (const View& view : views) centres.push_back(view.world_from_camera.translation());
+  const ViewSelection selection(centres, assumed_points(views, 3.3, 3.5));
+  for (std::size_t i = 0; i < 100; ++i) {
+    EXPECT_GT(centres[selection.sources(i, 1).at(0)].x(), 0.2);
+  }
+  for (const std::vector<std::size_t>& group : selection.groups(2)) {
+    ASSERT_EQ(group.size(), 2U);
+    EXPECT_GT(std::abs(centres[group[0]].x() - centres[group[1]].x()), 0.1);
+  }
 }
 
 TEST(ViewSelection, NeverPairsViewsOfOnePlace) {
