@@ -29,13 +29,21 @@ struct RefineArguments {
   bool as_json = false;
 };
 
-/// Matches between all pairs of views, those of all frames together.
+/// Matches between all pairs of views that see the same, those of all frames together.
 std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig, const std::vector<std::string>& files,
                                           const WhiteLevel& white_level) {
   const std::size_t count = rig.views.size();
   std::vector<ws::ViewMatches> pairs;
   for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t j = i + 1; j < count; ++j) pairs.push_back({i, j, {}});
+    for (std::size_t j = i + 1; j < count; ++j) {
+      if (count == 2 || ws::share_field_of_view(rig.views[i], rig.views[j])) {
+        pairs.push_back({i, j, {}});
+        continue;
+      }
+      std::fprintf(stderr,
+                   "widestereo: %s and %s see next to nothing in common and are not matched.\n",
+                   rig.views[i].name.c_str(), rig.views[j].name.c_str());
+    }
   }
   for (std::size_t frame = 0; frame < files.size(); frame += count) {
     std::vector<cv::Mat> images;
@@ -60,6 +68,12 @@ nlohmann::ordered_json to_json(const ws::RigRefinement& refined,
   const std::vector<ws::View>& views = refined.rig.views;
   nlohmann::ordered_json json;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!refined.left_out[i].empty()) {
+      json["pairs"].push_back({{"first", views[pairs[i].first].name},
+                               {"second", views[pairs[i].second].name},
+                               {"left_out", refined.left_out[i]}});
+      continue;
+    }
     json["pairs"].push_back({{"first", views[pairs[i].first].name},
                              {"second", views[pairs[i].second].name},
                              {"matches", refined.before[i].matches},
@@ -81,6 +95,11 @@ void print(const ws::RigRefinement& refined, const std::vector<ws::ViewMatches>&
            bool intrinsics) {
   const std::vector<ws::View>& views = refined.rig.views;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!refined.left_out[i].empty()) {
+      std::printf("%s - %s  left out: %s\n", views[pairs[i].first].name.c_str(),
+                  views[pairs[i].second].name.c_str(), refined.left_out[i].c_str());
+      continue;
+    }
     std::printf("%s - %s  %d matched features  epipolar error: median %.2f px -> %.2f px\n",
                 views[pairs[i].first].name.c_str(), views[pairs[i].second].name.c_str(),
                 refined.before[i].matches, refined.before[i].median_pixels,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "widestereo/epipolar.h"
@@ -33,8 +34,13 @@ struct ViewRefinement {
 struct RigRefinement {
   Rig rig;
   std::vector<ViewRefinement> views;
-  std::vector<EpipolarReport> before, after;  ///< of each pair of views
+  std::vector<EpipolarReport> before, after;  ///< of each pair of views; empty of those left out
+  std::vector<std::string> left_out;          ///< why each pair did not count; empty where it did
 };
+
+/// Whether enough of what one view sees, 0.3 to 50 m away, is in the other one for features to be
+/// matched: more than 2 %.
+bool share_field_of_view(const View& first, const View& second);
 
 /// The rig that matches fit best, near the calibrated one: for cameras that have moved since they
 /// were calibrated, or were calibrated less well than their images allow. Refined are the rotations
@@ -45,9 +51,12 @@ struct RigRefinement {
 /// direction, 0.2 % of focal length (rays hardly tell a factor that all cameras share) and one
 /// pixel of principal point. Minimises Sampson's epipolar error (Hartley, Zisserman, Multiple View
 /// Geometry, 2nd ed., section 11.4.3, with rays in place of homogeneous pixels), robustly, so that
-/// false matches do no harm. Throws Error when a pair names no two views of the rig, has fewer than
-/// 8 matches, or when the matches contradict each other, lie behind the cameras, or move a view by
-/// more than five times the accuracy above: images of other cameras or times can be fitted, too.
+/// false matches do no harm. Of three views or more a pair is left out that has fewer than 8
+/// matches, or whose matches contradict each other or lie behind the cameras, as those of views do
+/// that look away from each other. Throws Error when a pair names no two views of the rig, when the
+/// pairs do not connect every view with view 0, directly or by others, or when matches contradict
+/// each other, lie behind the cameras, or move a view by more than five times the accuracy above:
+/// images of other cameras or times can be fitted, too.
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs,
                          bool intrinsics = false);
 

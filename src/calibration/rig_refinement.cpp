@@ -7,11 +7,13 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <utility>
 
 #include "geometry/angle.h"
 #include "statistics/percentile.h"
 #include "statistics/robust.h"
 #include "widestereo/error.h"
+#include "widestereo/view_selection.h"
 
 namespace widestereo {
 namespace {
@@ -26,6 +28,10 @@ constexpr double direction_deviation = 2 / degrees_per_radian;
 constexpr double focal_deviation = 0.002;  // a factor that all cameras share fits as well
 constexpr double centre_deviation = 1;     // pixels
 constexpr double largest_change = 5;       // deviations: what matches of other views would fit
+
+/// Where views that see the same are told from those that do not.
+constexpr double nearest = 0.3, farthest = 50;  // metres
+constexpr double least_shared = 0.02;           // of the points that the view with fewer sees
 
 /// Unknowns of a view: its turn (radians, common frame), the shift of its centre across the line
 /// from view 0's (in units of that distance), the logarithm of its focal lengths, its principal
@@ -261,29 +267,46 @@ class Refinement {
   Eigen::VectorXd gradient_;
 };
 
-std::vector<EpipolarReport> check(const Rig& rig, const std::vector<ViewMatches>& pairs) {
-  std::vector<EpipolarReport> reports;
-  for (const ViewMatches& pair : pairs) {
-    reports.push_back(check_epipolar(rig.views[pair.first], rig.views[pair.second], pair.matches));
+/// Nothing of pairs that are left out.
+std::vector<EpipolarReport> check(const Rig& rig, const std::vector<ViewMatches>& pairs,
+                                  const std::vector<std::string>& left_out) {
+  std::vector<EpipolarReport> reports(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!left_out[i].empty()) continue;
+    const ViewMatches& pair = pairs[i];
+    reports[i] = check_epipolar(rig.views[pair.first], rig.views[pair.second], pair.matches);
   }
   return reports;
 }
 
+constexpr const char* remedy =
+    "; check that images matched with each other were taken at the same time, by the calibration's "
+    "cameras in its order.";
+
 [[noreturn]] void fail(const std::string& finding) {
-  throw Error(finding +
-              ", so that the rig cannot be refined; check that images matched with each other were "
-              "taken at the same time, by the calibration's cameras in its order.");
+  throw Error(finding + ", so that the rig cannot be refined" + remedy);
+}
+
+/// What is wrong with matches that a refined rig fits best; empty where nothing is.
+std::string fault_of(const EpipolarReport& after, const View& first, const View& second) {
+  const std::string pair = first.name + " and " + second.name;
+  if (!(after.below_5_pixels > 0.5)) {
+    return "The features matched between " + pair + " contradict each other";
+  }
+  if (after.behind > 0.5) {
+    return "Most features matched between " + pair + " lie behind the cameras";
+  }
+  return "";
 }
 
 /// Few unknowns can be made to fit matches of views that are not those of the calibration.
 void require_credible(const RigRefinement& refined, const std::vector<ViewMatches>& pairs) {
+  const std::vector<View>& views = refined.rig.views;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const EpipolarReport& report = refined.after[i];
-    if (!(report.below_5_pixels > 0.5)) fail("The matched features contradict each other");
-    if (report.behind > 0.5) {
-      fail("Most features matched between " + refined.rig.views[pairs[i].first].name + " and " +
-           refined.rig.views[pairs[i].second].name + " lie behind the cameras");
-    }
+    if (!refined.left_out[i].empty()) continue;
+    const std::string fault =
+        fault_of(refined.after[i], views[pairs[i].first], views[pairs[i].second]);
+    if (!fault.empty()) fail(fault);
   }
   const auto require_small = [](double change, double deviation, const std::string& what) {
     const double limit = largest_change * deviation * degrees_per_radian;
@@ -301,7 +324,60 @@ void require_credible(const RigRefinement& refined, const std::vector<ViewMatche
   }
 }
 
+/// Why a pair tells nothing of the rig, by itself: false matches must not count against the others.
+/// Empty where it does.
+std::string why_left_out(const Rig& rig, const ViewMatches& pair, bool intrinsics) {
+  const Rig alone{.views = {rig.views[pair.first], rig.views[pair.second]}};
+  const std::vector<ViewMatches> matches = {{0, 1, pair.matches}};
+  const auto report = [&pair](const Rig& two) {
+    return check_epipolar(two.views[0], two.views[1], pair.matches);
+  };
+  try {
+    (void)report(alone);  // are there enough?
+    Refinement refinement(alone, matches, intrinsics);
+    refinement.solve();
+    const std::string fault = fault_of(report(refinement.rig()), alone.views[0], alone.views[1]);
+    return fault.empty() ? "" : fault + remedy;
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+/// `left_out` says why pairs do not count.
+void require_connected(const Rig& rig, const std::vector<ViewMatches>& pairs,
+                       const std::vector<std::string>& left_out) {
+  std::vector<bool> reached(rig.views.size());
+  reached[0] = true;
+  for (std::size_t round = 1; round < rig.views.size(); ++round) {
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const ViewMatches& pair = pairs[i];
+      if (!left_out[i].empty() || reached[pair.first] == reached[pair.second]) continue;
+      reached[pair.first] = reached[pair.second] = true;
+    }
+  }
+  const auto missing =
+      static_cast<std::size_t>(std::find(reached.begin(), reached.end(), false) - reached.begin());
+  if (missing == rig.views.size()) return;
+  const std::string finding = "No matches connect " + rig.views[missing].name + " with " +
+                              rig.views[0].name + ", so that the rig cannot be refined";
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (left_out[i].empty() || (pairs[i].first != missing && pairs[i].second != missing)) continue;
+    throw Error(finding + ": " + left_out[i]);
+  }
+  throw Error(finding + "; refine views that share no field of view in calibrations of their own.");
+}
+
 }  // namespace
+
+bool share_field_of_view(const View& first, const View& second) {
+  std::array<int, 2> seen = {0, 0};
+  int shared = 0;
+  for (const ObservedPoint& point : assumed_points({first, second}, nearest, farthest)) {
+    for (const std::size_t observer : point.observers) ++seen[observer];
+    if (point.observers.size() == 2) ++shared;
+  }
+  return shared > least_shared * std::min(seen[0], seen[1]);
+}
 
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, bool intrinsics) {
   if (pairs.empty()) throw Error("A rig cannot be refined without matches between its views.");
@@ -315,12 +391,19 @@ RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, 
                 std::to_string(rig.views.size()) + " views; name two of them, counted from 0.");
   }
   RigRefinement result;
-  result.before = check(rig, pairs);
-  Refinement refinement(rig, pairs, intrinsics);
+  result.left_out.resize(pairs.size());
+  std::vector<ViewMatches> used = pairs;
+  for (std::size_t i = 0; rig.views.size() > 2 && i < pairs.size(); ++i) {
+    result.left_out[i] = why_left_out(rig, pairs[i], intrinsics);
+    if (!result.left_out[i].empty()) used[i].matches.clear();
+  }
+  require_connected(rig, pairs, result.left_out);
+  result.before = check(rig, pairs, result.left_out);
+  Refinement refinement(rig, used, intrinsics);
   refinement.solve();
   result.rig = refinement.rig();
   result.views = refinement.report();
-  result.after = check(result.rig, pairs);
+  result.after = check(result.rig, pairs, result.left_out);
   require_credible(result, pairs);
   return result;
 }

@@ -258,6 +258,83 @@ TEST(RigRefinement, MatchesOfOtherViewsAreRefused) {
             std::string::npos);
 }
 
+/// Views 0 and 1 side by side, 2 and 3 as well, back to back with them, 200 degrees each.
+Rig surround_rig() {
+  Rig rig = true_rig();
+  rig.views.resize(2);
+  for (View& view : rig.views) {
+    view.camera = rig.views[1].camera;
+    view.camera.max_theta = 100 * radians;
+  }
+  const Eigen::Isometry3d& base = rig.views[0].world_from_camera;
+  for (int i : {0, 1}) {
+    View view = rig.views[static_cast<std::size_t>(i)];
+    view.name = "cam" + std::to_string(2 + i);
+    view.world_from_camera = base * Eigen::Translation3d(0.1 * i, 0.02, -0.15) *
+                             turned(180 + i, Eigen::Vector3d::UnitY());
+    rig.views.push_back(view);
+  }
+  return rig;
+}
+
+/// As `count` features found in a repetitive scene.
+std::vector<PixelMatch> false_matches(int count) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> at(130, 380);
+  std::vector<PixelMatch> matches;
+  for (int i = 0; i < count; ++i) {
+    matches.push_back({{at(random), at(random)}, {at(random), at(random)}});
+  }
+  return matches;
+}
+
+TEST(RigRefinement, PairsThatSeeNothingInCommonAreLeftOut) {
+  const Rig truth = true_rig();
+  const Rig calibrated = displaced(truth, 0.4);
+  const std::vector<ViewMatches> all = matches_of(truth, {.noise = 0.1});
+  for (const int count : {0, 5, 300}) {
+    std::vector<ViewMatches> matches = all;
+    matches[1].matches = false_matches(count);  // view 2 is seen by view 1 alone
+    const RigRefinement refined = refine_rig(calibrated, matches);
+    EXPECT_EQ(refined.left_out[0], "");
+    EXPECT_NE(refined.left_out[1].find(count < 8 ? "Only" : "contradict"), std::string::npos)
+        << refined.left_out[1];
+    EXPECT_NE(refined.left_out[1].find("cam0 and cam2"), std::string::npos);
+    EXPECT_EQ(refined.left_out[2], "");
+    ASSERT_EQ(refined.after.size(), 3U);
+    EXPECT_EQ(refined.after[1].matches, 0);
+    EXPECT_EQ(refined.after[2].matches, 400);
+    for (const std::size_t view : {1, 2}) {
+      EXPECT_LT(rotation_error(refined.rig, truth, view), 0.02) << count;
+    }
+  }
+}
+
+TEST(RigRefinement, ViewsThatNothingConnectsAreNamed) {
+  const Rig rig = true_rig();
+  std::vector<ViewMatches> matches = matches_of(rig, {});
+  matches.resize(1);
+  const std::string unmatched = test::error_of([&] { refine_rig(rig, matches); });
+  EXPECT_NE(unmatched.find("No matches connect cam2 with cam0"), std::string::npos) << unmatched;
+  matches = matches_of(rig, {});
+  matches[0].matches = false_matches(300);
+  matches[2].matches = false_matches(3);
+  const std::string unrelated = test::error_of([&] { refine_rig(rig, matches); });
+  EXPECT_NE(unrelated.find("No matches connect cam1 with cam0"), std::string::npos) << unrelated;
+  EXPECT_NE(unrelated.find("cam0 and cam1 contradict"), std::string::npos) << unrelated;
+}
+
+TEST(RigRefinement, FieldsOfViewTellWhichPairsToMatch) {
+  Rig rig = surround_rig();
+  EXPECT_TRUE(share_field_of_view(rig.views[0], rig.views[1]));
+  EXPECT_TRUE(share_field_of_view(rig.views[2], rig.views[3]));
+  EXPECT_TRUE(share_field_of_view(rig.views[0], rig.views[2])) << "at their rims";
+  for (View& view : rig.views) view.camera.max_theta = 85 * radians;
+  EXPECT_TRUE(share_field_of_view(rig.views[0], rig.views[1]));
+  EXPECT_FALSE(share_field_of_view(rig.views[0], rig.views[2]));
+  EXPECT_FALSE(share_field_of_view(rig.views[3], rig.views[1]));
+}
+
 TEST(RigRefinement, ARealRigGetsBetter) {
   SKIP_WITHOUT_STEREO_SETS();
   const auto set = test::data_folder() / "real/vfs_t265_fs";
