@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/fusion.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <list>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -119,12 +121,57 @@ class Mean {
 // A point stands for pixels that see it from less far than this times as far as its own, too.
 constexpr double as_fine = 1.2;
 
+/// How finely a point is seen: the distance it is seen from in sixteenths of an octave, modulo 255,
+/// so that it fits a byte; 0 where a pixel is part of no point.
+using Fineness = std::uint8_t;
+constexpr double steps_per_octave = 16;
+constexpr long fineness_values = 255;
+
+Fineness fineness_from(double distance) {
+  const long step = std::lround(steps_per_octave * std::log2(distance)) % fineness_values;
+  return static_cast<Fineness>(1 + (step + fineness_values) % fineness_values);
+}
+
+/// How many steps coarser `a` is than `b`, which is less than 128 either way.
+long steps_coarser(Fineness a, Fineness b) {
+  constexpr long half = fineness_values / 2;
+  return (a - b + fineness_values + half) % fineness_values - half;
+}
+
+/// The distance nearest to another one.
+double distance_of(Fineness fineness, double near) {
+  return near * std::exp2(static_cast<double>(steps_coarser(fineness, fineness_from(near))) /
+                          steps_per_octave);
+}
+
+/// Of which points of the cloud the pixels of a view are part.
+struct Membership {
+  std::vector<Fineness> before;  ///< of points that earlier views made, row by row
+  std::vector<Fineness> now;     ///< of the present view; looked at by nobody, so that rows may be
+                                 ///< taken at once
+
+  void begin(std::size_t pixels) {
+    before.resize(pixels);
+    now.assign(pixels, 0);
+  }
+  void settle() {
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      if (now[i] == 0) continue;
+      if (before[i] == 0 || steps_coarser(before[i], now[i]) > 0) before[i] = now[i];
+    }
+    now = {};
+  }
+};
+
 /// What another view has where a point lies.
 enum class Finding { nothing, same_point, point_of_cloud, farther_surface };
 
-/// Whether a pixel is part of a point of the cloud: since an earlier view, or of the present one.
-/// Only the former is looked at, so that rows may be taken at once.
-enum Membership : std::uint8_t { free_pixel, taken, taken_now };
+/// A pixel that has the same point.
+struct Joined {
+  Fineness* now;
+  Fineness fineness;
+  Fineness before;
+};
 
 /// A view beside the one whose pixels are taken.
 struct Neighbour {
@@ -137,11 +184,23 @@ struct Neighbour {
 
 class Fusion {
  public:
-  Fusion(const std::vector<View>& views, const MapsOfView& maps, const FusionOptions& options)
-      : views_(views), options_(options), clouds_(views, maps, options.cache_bytes) {
-    for (const View& view : views) {
-      memberships_.emplace_back(static_cast<std::size_t>(view.camera.width) *
-                                static_cast<std::size_t>(view.camera.height));
+  Fusion(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
+         const MapsOfView& maps, const FusionOptions& options)
+      : views_(views),
+        options_(options),
+        clouds_(views, maps, options.cache_bytes),
+        memberships_(views.size()),
+        last_use_(views.size()) {
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      last_use_[i] = std::max(last_use_[i], i);
+      // Clouds hold more than the index, and fewer are looked at then.
+      std::size_t looked_at = 0, bytes = index_bytes(i);
+      for (const std::size_t other : others[i]) {
+        if (other == i) continue;
+        if (!is_looked_at(looked_at++, bytes)) break;
+        bytes += index_bytes(other);
+        last_use_[other] = i;
+      }
     }
   }
 
@@ -151,8 +210,7 @@ class Fusion {
     std::size_t bytes = self.cloud->bytes();
     for (const std::size_t other : others) {
       if (other == number) continue;
-      // The next view shares most of them, and finds them in the other half of the cache.
-      if (neighbours.size() >= least_others && bytes > options_.cache_bytes / 2) break;
+      if (!is_looked_at(neighbours.size(), bytes)) break;
       neighbours.push_back(neighbour(other));
       bytes += neighbours.back().cloud->bytes();
     }
@@ -164,48 +222,61 @@ class Fusion {
       }
     });
     for (const PointCloud& row : rows) points_.insert(points_.end(), row.begin(), row.end());
-    settle(number);
-    for (const Neighbour& other : neighbours) settle(other.number);
+    memberships_[number].settle();
+    for (const Neighbour& other : neighbours) memberships_[other.number].settle();
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      if (last_use_[i] == number) memberships_[i] = {};
+    }
   }
 
   PointCloud take() { return std::move(points_); }
 
  private:
+  std::size_t pixels_of(std::size_t view) const {
+    const Camera& camera = views_[view].camera;
+    return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  }
+
+  std::size_t index_bytes(std::size_t view) const { return pixels_of(view) * sizeof(int); }
+
+  /// Whether a view's next other is, after so many, whose clouds and its own take so many bytes:
+  /// the next view shares most of them, and finds them in the other half of the cache.
+  bool is_looked_at(std::size_t others, std::size_t bytes) const {
+    return others < least_others || bytes <= options_.cache_bytes / 2;
+  }
+
   Neighbour neighbour(std::size_t number) {
     const View& view = views_[number];
+    memberships_[number].begin(pixels_of(number));
     return {number, &view, PreparedCamera(view.camera), view.world_from_camera.inverse(),
             clouds_.get(number)};
   }
 
-  std::uint8_t& membership(const Neighbour& view, int x, int y) {
-    return memberships_[view.number][static_cast<std::size_t>(y) * view.cloud->index.cols + x];
+  static std::size_t place_of(const Neighbour& view, int x, int y) {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(view.cloud->index.cols) +
+           static_cast<std::size_t>(x);
   }
 
-  static bool is_taken(std::uint8_t& membership) {
-    return std::atomic_ref(membership).load(std::memory_order_relaxed) == taken;
+  Fineness* now(const Neighbour& view, int x, int y) {
+    return &memberships_[view.number].now[place_of(view, x, y)];
   }
 
-  static void take_now(std::uint8_t& membership) {
-    if (!is_taken(membership)) {
-      std::atomic_ref(membership).store(taken_now, std::memory_order_relaxed);
-    }
-  }
-
-  void settle(std::size_t number) {
-    for (std::uint8_t& membership : memberships_[number]) {
-      if (membership == taken_now) membership = taken;
-    }
+  /// Several pixels of the present view may join the same one.
+  static void mark(Fineness& pixel, Fineness fineness) {
+    std::atomic_ref(pixel).store(fineness, std::memory_order_relaxed);
   }
 
   void add_row(int y, const Neighbour& self, const std::vector<Neighbour>& neighbours,
                PointCloud& row) {
-    std::vector<std::uint8_t*> joined;
+    const std::vector<Fineness>& before = memberships_[self.number].before;
+    std::vector<Joined> joined;
     for (int x = 0; x < self.cloud->index.cols; ++x) {
       const int index = self.cloud->index.at<int>(y, x);
-      if (index == no_point || is_taken(membership(self, x, y))) continue;
+      if (index == no_point || before[place_of(self, x, y)] != 0) continue;
       const CloudPoint& point = self.cloud->points[static_cast<std::size_t>(index)];
+      const double distance = distance_from(self, point);
       Mean mean;
-      mean.add(point, distance_from(self, point));
+      mean.add(point, distance);
       joined.clear();
       int seen_through = 0;
       bool is_known = false;
@@ -214,16 +285,21 @@ class Fusion {
         if (found == Finding::farther_surface) ++seen_through;
         is_known = found == Finding::point_of_cloud;
       }
-      if (is_known || mean.count() < options_.min_views) continue;
+      if (is_known) {
+        // As finely as the point was seen: else coarse ones would stand for ever finer pixels.
+        mark(*now(self, x, y), joined.back().before);
+        continue;
+      }
+      if (mean.count() < options_.min_views) continue;
       if (options_.min_views > 1 && seen_through > mean.count()) continue;
       row.push_back(mean.point());
-      take_now(membership(self, x, y));
-      for (std::uint8_t* pixel : joined) take_now(*pixel);
+      mark(*now(self, x, y), fineness_from(distance));
+      for (const Joined& pixel : joined) mark(*pixel.now, pixel.fineness);
     }
   }
 
   Finding join(const cv::Point& pixel, const CloudPoint& point, const Neighbour& self,
-               const Neighbour& other, Mean& mean, std::vector<std::uint8_t*>& joined) {
+               const Neighbour& other, Mean& mean, std::vector<Joined>& joined) {
     Eigen::Vector2d position;
     const Eigen::Vector3d seen = other.camera_from_world * point.position.cast<double>();
     if (!other.camera.project_into_image(seen, position)) return Finding::nothing;
@@ -245,8 +321,9 @@ class Fusion {
     if (degrees_between(a, b) > options_.max_normal_angle) return Finding::nothing;
     const double distance = distance_from(other, candidate);
     mean.add(candidate, distance);
-    joined.push_back(&membership(other, x, y));
-    return is_taken(*joined.back()) && distance <= as_fine * distance_from(self, point)
+    const Fineness before = memberships_[other.number].before[place_of(other, x, y)];
+    joined.push_back({now(other, x, y), fineness_from(distance), before});
+    return before != 0 && distance_of(before, distance) <= as_fine * distance_from(self, point)
                ? Finding::point_of_cloud
                : Finding::same_point;
   }
@@ -270,7 +347,8 @@ class Fusion {
   const std::vector<View>& views_;
   const FusionOptions& options_;
   CloudCache clouds_;
-  std::vector<std::vector<std::uint8_t>> memberships_;  // of each view, row by row
+  std::vector<Membership> memberships_;  // of each view, from its first use to its last
+  std::vector<std::size_t> last_use_;    // of each view: the last one that may look at it
   PointCloud points_;
 };
 
@@ -292,7 +370,7 @@ PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<st
     }
   }
   if (views.empty()) return {};
-  Fusion fusion(views, maps, options);
+  Fusion fusion(views, others, maps, options);
   for (std::size_t i = 0; i < views.size(); ++i) {
     fusion.add(i, others[i]);
     if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(views.size()));

@@ -157,6 +157,41 @@ TEST_F(Fusion, ViewsThatAreNotComparedWithEachOtherShareTheirPoints) {
   const std::vector<std::vector<std::size_t>> chain = {{1}, {0}, {1}, {0}, {1}, {0}};
   const auto one = static_cast<std::size_t>(cv::countNonZero(maps_[0].distance > 0));
   EXPECT_EQ(fuse(same, chain, maps).size(), one);
+  // Views that make no point of their own hand points on.
+  const std::vector<std::vector<std::size_t>> line = {{1}, {0}, {1}, {2}, {3}, {4}};
+  EXPECT_EQ(fuse(same, line, maps).size(), one);
+}
+
+/// A wall that each view is little nearer to than the one it is compared with.
+TEST_F(Fusion, CoarsePointsAreNotHandedOnToEverFinerPixels) {
+  Rig rig = demo_rig(side);
+  rig.views.resize(1, rig.views[0]);
+  rig.views[0].world_from_camera.setIdentity();
+  for (double distance = 2; distance > 1;) {
+    distance *= 0.9;
+    rig.views.push_back(rig.views[0]);
+    rig.views.back().world_from_camera = Eigen::Translation3d(0, 0, 2 - distance);
+  }
+  const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
+  const auto points_ahead = [&](std::size_t first) {
+    std::vector<View> views;
+    std::vector<std::vector<std::size_t>> others;
+    for (std::size_t i = first; i < scene.rig.views.size(); ++i) {
+      others.push_back({views.empty() ? 1 : views.size() - 1});
+      views.push_back(scene.rig.views[i]);
+    }
+    const PointCloud cloud = fuse(views, others, [&](std::size_t i) {
+      return ViewMaps{.distance = scene.views[first + i].truth.distance,
+                      .normals = {},
+                      .image = {},
+                      .confidence = {}};
+    });
+    return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
+      return point.position.head<2>().norm() < 0.5F;
+    });
+  };
+  const auto fine = points_ahead(scene.rig.views.size() - 2);
+  EXPECT_GT(10 * points_ahead(0), 7 * fine);
 }
 
 /// A wall 2 m ahead of one view and 1 m ahead of the other, where it is four times as fine.
