@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -43,10 +44,12 @@ inline double baseline(const View& a, const View& b) {
 /// the positions of all views that are used together.
 Eigen::Vector3d local_origin(const View& view);
 
-/// Whether two camera centres (world frame) are far enough apart to tell distances at all.
+/// Whether two camera centres (world frame) are far enough apart to tell distances at all, and not
+/// one place that has been rounded, as in national grids.
 inline bool has_baseline(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  constexpr double least = 1e-9;  // metres
-  return (a - b).norm() > least;
+  constexpr double least = 1e-9;      // metres
+  constexpr double rounding = 1e-14;  // of a centre, share of its distance from the origin
+  return (a - b).norm() > least + rounding * std::max(a.norm(), b.norm());
 }
 
 /// The view of an image that is scaled to another size by its corners. A pixel is excluded where

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 
 #include "widestereo/error.h"
@@ -108,6 +109,25 @@ TEST(RigGeometry, LocalOriginsAreWholeKilometresFarFromTheWorlds) {
   };
   EXPECT_EQ(origin_at(9999, -9999, 0), Eigen::Vector3d::Zero());
   EXPECT_EQ(origin_at(600'499, -5'700'501, 70), Eigen::Vector3d(600'000, -5'701'000, 0));
+}
+
+/// Poses to the camera, as COLMAP has them, of one place far from the origin.
+TEST(RigGeometry, RoundedCentresAreNoBaseline) {
+  const Eigen::Vector3d place(4'075'539.8, 931'735.3, 4'801'629.5);
+  const auto centre = [&place](double angle, const Eigen::Vector3d& axis) -> Eigen::Vector3d {
+    const Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, axis.normalized()).matrix();
+    const Eigen::Vector3d translation = -(rotation * place);
+    return -(rotation.transpose() * translation);
+  };
+  double farthest = 0;
+  for (int i = 1; i < 1000; ++i) {
+    const Eigen::Vector3d turned = centre(0.1 * i, {1.0, 0.01 * i, 2.0 - i});
+    farthest = std::max(farthest, (turned - place).norm());
+    EXPECT_FALSE(has_baseline(turned, place));
+  }
+  EXPECT_GT(farthest, 1e-9);
+  EXPECT_TRUE(has_baseline(place, place + Eigen::Vector3d(1e-6, 0, 0)));
+  EXPECT_TRUE(has_baseline({0, 0, 0}, {2e-9, 0, 0}));
 }
 
 TEST(RigGeometry, RelativePoseMovesPoints) {
