@@ -2,9 +2,12 @@
 #include "posed_images.h"
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <tuple>
+#include <utility>
 
 #include "matching_run.h"
 #include "progress_bar.h"
@@ -56,7 +59,14 @@ PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   apply_masks(posed);
   posed.size = size;
   posed.white_level = white_level;
-  for (const ws::View& view : posed.calibrated) posed.views.push_back(size.reduced(view));
+  // One mask of many images stays one in memory.
+  std::map<std::tuple<const uchar*, int, int>, cv::Mat> reduced_masks;
+  for (const ws::View& view : posed.calibrated) {
+    ws::View& reduced = posed.views.emplace_back(size.reduced(view));
+    cv::Mat& mask = reduced_masks[{view.mask.data, reduced.camera.width, reduced.camera.height}];
+    if (mask.empty()) mask = reduced.mask;
+    reduced.mask = mask;
+  }
   if (masks.empty()) leave_out_dark_rims(posed);
   if (posed.selection == nullptr) {
     const ws::CalibratedImages without_points{.rig = {}, .in_metres = posed.in_metres};
@@ -84,6 +94,7 @@ PosedImages PosedImageSettings::of_model() const {
   PosedImages posed;
   posed.in_metres = false;
   Images all;
+  ws::Rig rig_of_all;
   for (std::size_t i = 0; i < model->names().size(); ++i) {
     posed.files.push_back(model->file_of(i, images));
     if (!fs::exists(posed.files.back())) {
@@ -92,11 +103,11 @@ PosedImages PosedImageSettings::of_model() const {
                       std::to_string(model->names().size()) + " images in " + rig.calibration +
                       " begin in, or correct them.");
     }
-    ws::Rig one = model->calibrated({i}).rig;
-    rig.limit_fields_of_view(one);
-    posed.calibrated.push_back(one.views.front());
+    rig_of_all.views.push_back(model->calibrated({i}).rig.views.front());
     all.push_back(i);
   }
+  rig.limit_fields_of_view(rig_of_all);
+  posed.calibrated = std::move(rig_of_all.views);
   posed.origin = move_near_origin(posed.calibrated);
   if (model->has_points()) posed.selection = {model, &model->selection()};
   using Distances = std::optional<ws::DistanceRange>;

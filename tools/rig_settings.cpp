@@ -85,17 +85,17 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
     throw ws::Error("--mask was given " + std::to_string(masks.size()) + " times for " +
                     std::to_string(rig.views.size()) + " views; give one for all or one for each.");
   }
+  std::vector<cv::Mat> read;  // one for all views stays one in memory
+  for (const std::string& file : masks) {
+    read.push_back(ws::read_mask(file));
+    if (cv::countNonZero(read.back()) > 0) continue;
+    throw ws::Error("The mask " + file +
+                    " is 0 everywhere, so that no pixel is left; 0 means to ignore the pixel.");
+  }
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     ws::View& view = rig.views[i];
     if (max_theta > 0) view.camera.max_theta = max_theta * std::numbers::pi / 180;
-    if (!masks.empty()) {
-      const std::string& file = masks[masks.size() == 1 ? 0 : i];
-      view.mask = ws::read_mask(file);
-      if (cv::countNonZero(view.mask) == 0) {
-        throw ws::Error("The mask " + file +
-                        " is 0 everywhere, so that no pixel is left; 0 means to ignore the pixel.");
-      }
-    }
+    if (!read.empty()) view.mask = read[read.size() == 1 ? 0 : i];
   }
 }
 
