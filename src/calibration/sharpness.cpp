@@ -9,6 +9,7 @@
 
 #include "calibration/match_rays.h"
 #include "statistics/percentile.h"
+#include "statistics/robust.h"
 #include "widestereo/image_io.h"
 
 namespace widestereo {
@@ -115,7 +116,7 @@ std::optional<Estimate> excess(const std::vector<double>& a, const std::vector<d
   Estimate estimate{.value = percentile(differences, 0.5)};
   for (double& difference : differences) difference = std::abs(difference - estimate.value);
   // A median's deviation, from the median absolute one of what it is taken of.
-  estimate.error = 1.253 * 1.483 * percentile(differences, 0.5) /
+  estimate.error = 1.253 * deviations_per_median * percentile(differences, 0.5) /
                    std::sqrt(static_cast<double>(differences.size()));
   return estimate;
 }

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -142,7 +141,7 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       sample.pixel = {x, y};
       sample.truth = static_cast<double>(gt);
       const Eigen::Vector3d ray = direction(rays.at<cv::Vec4f>(y, x));
-      sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * 180 / std::numbers::pi;
+      sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * degrees_per_radian;
       sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
       if (!confidence.empty()) sample.confidence = confidence_at(confidence, x, y);
       Eigen::Vector2d expected;
@@ -170,6 +169,8 @@ bool is_right(const Sample& sample) { return sample.displacement <= right_pixels
 /// What no pixel tells.
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
+/// The mean of the two middle values of an even number, as scores are usually given; percentile()
+/// takes the lower.
 double median_of(std::vector<double> values) {
   if (values.empty()) return unknown;
   const auto middle = values.begin() + static_cast<long>(values.size() / 2);

@@ -10,6 +10,7 @@
 
 #include "geometry/cross_matrix.h"
 #include "geometry/validation.h"
+#include "statistics/percentile.h"
 #include "statistics/robust.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -55,13 +56,6 @@ cv::Vec3f bilinear(const cv::Mat_<cv::Vec3f>& image, const Eigen::Vector2d& at) 
   const auto fy = static_cast<float>(at.y() - y);
   return (1 - fy) * ((1 - fx) * image(y, x) + fx * image(y, x + 1)) +
          fy * ((1 - fx) * image(y + 1, x) + fx * image(y + 1, x + 1));
-}
-
-/// The middle value, the upper one of two, where percentile() takes the lower. Reorders the values.
-double upper_median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Calls function(view), which must not throw, for all views at once.
@@ -165,7 +159,7 @@ class Alignment {
     for (const std::vector<Point>& of_view : points_) {
       for (const Point& point : of_view) distances.push_back(point.position.norm());
     }
-    return upper_median(distances);
+    return percentile(distances, 0.5);
   }
 
   std::vector<Row> rows_of(std::size_t i, const BlurredView& view) const {
@@ -209,7 +203,7 @@ class Alignment {
     }
     normals.points = sizes.size();
     if (sizes.empty()) return normals;
-    const double scale = deviations_per_median * upper_median(sizes) + 1e-4;
+    const double scale = deviations_per_median * percentile(sizes, 0.5) + 1e-4;
     normals.variance = scale * scale;
     for (std::size_t i = 0; i < of_views.size(); ++i) {
       const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);
