@@ -136,11 +136,13 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float gt = truth.distance.at<float>(y, x);
-      if (!has_distance(gt) || (!truth.valid.empty() && truth.valid.at<uchar>(y, x) == 0)) continue;
+      const cv::Vec4f& ray_of_pixel = rays.at<cv::Vec4f>(y, x);
+      if (!has_point(gt, ray_of_pixel)) continue;
+      if (!truth.valid.empty() && truth.valid.at<uchar>(y, x) == 0) continue;
       Sample& sample = samples.emplace_back();
       sample.pixel = {x, y};
       sample.truth = static_cast<double>(gt);
-      const Eigen::Vector3d ray = direction(rays.at<cv::Vec4f>(y, x));
+      const Eigen::Vector3d ray = direction(ray_of_pixel);
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * degrees_per_radian;
       sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
       if (!confidence.empty()) sample.confidence = confidence_at(confidence, x, y);

@@ -223,6 +223,15 @@ TEST_F(TexturedScene, TheBorderOfTheFieldOfViewIsNoTexture) {
   EXPECT_GT(textured({}).pixels, 0);
 }
 
+TEST_F(FourPixels, WithoutARayAreNotScored) {
+  // The four in the middle have one, the others would be more than 180 degrees off the axis.
+  reference_.camera.model = CameraModel::kannala_brandt;
+  reference_.camera.fx = reference_.camera.fy = 0.4;
+  const RegionScores all = evaluate(truth_.distance, {}, truth_, reference_, source_)[0];
+  EXPECT_EQ(all.pixels, 2);
+  EXPECT_EQ(all.completeness, 1);
+}
+
 TEST_F(FourPixels, EmptyAndWrongInputs) {
   truth_.valid.setTo(0);
   const std::vector<RegionScores> none = evaluate(truth_.distance, {}, truth_, reference_, source_);
