@@ -26,6 +26,12 @@ long long work_of_voters(long long radius, long long step, long long row_step) {
   return samples_of_voter * (2 * radius / step + 1) * (2 * radius / row_step + 1);
 }
 
+/// Those that a pixel passes to the edge of the image or of the radius, which none may be accepted
+/// in.
+long long pixels_on_eight_rays(const Dispatch& dispatch) {
+  return 8LL * std::min(dispatch.pass.radius, std::max(dispatch.width, dispatch.height));
+}
+
 /// Of a dispatch, in samples; a kernel without patches may still look at every pixel's window.
 long long estimated_work(const Dispatch& dispatch, const KernelConstants& constants) {
   const long long side = 2 * constants.window_radius + 1;
@@ -41,6 +47,8 @@ long long estimated_work(const Dispatch& dispatch, const KernelConstants& consta
              dispatch.pixels;
     case Kernel::check:
       return dispatch.samples + of_windows;
+    case Kernel::fill:
+      return of_windows + pixels_on_eight_rays(dispatch) * dispatch.pixels;
     default:
       return dispatch.samples > 0 ? dispatch.samples : of_windows;
   }

@@ -130,6 +130,18 @@ TEST(Work, OfPlaneFitsOfATileReadsSideBySide) {
   EXPECT_GT(places.size(), 2u) << "other tiles' grids lie elsewhere";
 }
 
+TEST(Work, OfABandCoversFillsThatReachAcrossTheImage) {
+  Options options = Options::preset_named("fast");
+  options.fill_radius = 10000;
+  const Schedule schedule = make_schedule(fisheye_rig(96), options);
+  const std::vector<Band> bands = split_into_bands(schedule, std::numeric_limits<long long>::max());
+  const Band& last_fill = *std::find_if(bands.rbegin(), bands.rend(), [](const Band& band) {
+    return band.dispatch->kernel == Kernel::fill;
+  });
+  EXPECT_GE(last_fill.work, 8 * 96 * last_fill.dispatch->pixels);
+  EXPECT_LE(last_fill.work, 16 * 96 * last_fill.dispatch->pixels);
+}
+
 /// What splitting counts for a dispatch of each kernel, in operations a pixel.
 std::map<Kernel, std::vector<double>> operations_of_bands(const Schedule& schedule) {
   std::map<Kernel, std::vector<double>> operations;
