@@ -117,6 +117,7 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                  const ws::DeviceInfo& device) {
   Json settings = {{"program", "widestereo " WIDESTEREO_VERSION},
                    {"dataset", absolute_path(a.dataset)},
+                   {"folders", a.frames.folders},
                    {"calibration", absolute_path(a.rig.calibration)},
                    {"masks", absolute_paths(a.rig.masks)},
                    {"white_level", a.white_level.value()},

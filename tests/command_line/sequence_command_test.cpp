@@ -122,6 +122,14 @@ TEST_F(SequenceCommand, ImagesMayBeInFoldersOfAnyName) {
   expect_same_results("standard", "other");
 }
 
+TEST_F(SequenceCommand, OtherFoldersAreOtherSettings) {
+  fs::copy(folder_ / "data/cam1", folder_ / "data/third");
+  ASSERT_EQ(run(sequence() + "--folders cam0,cam1").exit_code, 0);
+  const Outcome outcome = run(sequence() + "--folders cam0,third");
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_NE(outcome.output.find("folders"), std::string::npos) << outcome.output;
+}
+
 TEST_F(SequenceCommand, ReplacedImagesAreMatchedAgain) {
   ASSERT_EQ(run(sequence()).exit_code, 0);
   const std::string first = bytes_of(folder_ / "out/000/result.json");
