@@ -9,6 +9,7 @@
 #include "commands.h"
 #include "json_text.h"
 #include "match_settings.h"
+#include "matching_run.h"
 #include "option_checks.h"
 #include "roofline.h"
 #include "widestereo/error.h"
@@ -58,9 +59,8 @@ void print_header(int runs) {
 void print_row(const Measurement& m) {
   const ws::KernelWork work = sum_of(m.kernels);
   const Roofline least = roofline(m.kernels, m.device.peaks);
-  const double seconds = m.on_device / 1000;
   char share[64] = "-";
-  if (least.milliseconds > 0) {
+  if (least.milliseconds > 0 && m.on_device > 0) {
     std::snprintf(share, sizeof share, "%.1f %% of %s", 100 * least.milliseconds / m.on_device,
                   least.bound.c_str());
   }
@@ -68,16 +68,16 @@ void print_row(const Measurement& m) {
       "%-10s %-8s %5d %4d  %9.1f [%9.1f %9.1f]  %9.1f  %8.0f  %8.1f  %8.1f  %8.2f %6.1f  %-18s "
       "%6.1f\n",
       m.device.id.c_str(), m.preset.c_str(), m.size, m.window_radius, m.wall, m.wall_min,
-      m.wall_max, m.on_device, work.samples / m.pixels(), 1e-6 * work.samples / seconds,
-      1e-9 * work.operations / seconds, 1e-9 * work.texels / seconds, 1e-9 * work.bytes / seconds,
-      share, static_cast<double>(m.device_bytes) / (1 << 20));
+      m.wall_max, m.on_device, work.samples / m.pixels(), m.per_second(1e-6 * work.samples),
+      m.per_second(1e-9 * work.operations), m.per_second(1e-9 * work.texels),
+      m.per_second(1e-9 * work.bytes), share, static_cast<double>(m.device_bytes) / (1 << 20));
   std::string shares;
   double one_by_one = 0;
   for (const ws::KernelTime& kernel : m.kernels) one_by_one += kernel.milliseconds;
   for (const ws::KernelTime& kernel : m.kernels) {
     char text[64];
     std::snprintf(text, sizeof text, " %s %.0f %%", kernel.kernel.c_str(),
-                  100 * kernel.milliseconds / one_by_one);
+                  one_by_one > 0 ? 100 * kernel.milliseconds / one_by_one : 0);
     shares += text;
   }
   std::printf("           %s\n", shares.c_str());
@@ -120,8 +120,11 @@ void run_benchmark(BenchmarkArguments a) {
       if (device.unusable.empty()) a.devices.push_back(device.id);
     }
   }
-  // One that cannot be opened is refused before others take their time.
-  for (const std::string& name : a.devices) ws::Device::open(name);
+  // What cannot be measured is refused before others take their time.
+  for (const std::string& name : a.devices) {
+    const ws::Device device = ws::Device::open(name);
+    if (a.filter == ws::Filter::device) require_device_filter(device.info());
+  }
   Json rows = Json::array();
   std::vector<PlotBar> bars;
   if (!a.as_json) print_header(a.runs);

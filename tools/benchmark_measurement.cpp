@@ -102,6 +102,7 @@ Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::
   m.size = pair.rig.views[0].camera.width;
   m.window_radius = options.window_radius;
   m.options = ws::to_json(options);
+  m.filter = results.front().filter;
   m.wall = wall[wall.size() / 2];
   m.wall_min = wall.front();
   m.wall_max = wall.back();
@@ -126,11 +127,12 @@ Json json_of(const Measurement& m) {
           {"size", m.size},
           {"window_radius", m.window_radius},
           {"options", Json::parse(m.options)},
+          {"filter_used", ws::to_string(m.filter)},
           {"milliseconds", m.wall},
           {"milliseconds_min", m.wall_min},
           {"milliseconds_max", m.wall_max},
           {"samples_per_pixel", work.samples / m.pixels()},
-          {"million_samples_per_second", work.samples / m.on_device / 1000},
+          {"million_samples_per_second", m.per_second(1e-6 * work.samples)},
           {"device_bytes", m.device_bytes},
           {"peaks", to_json(peaks)},
           {"on_device", json_of(work, m.on_device, roofline(m.kernels, peaks))},

@@ -15,12 +15,15 @@ struct Measurement {
   int size = 0;
   int window_radius = 0;
   std::string options;                          // every parameter as JSON
+  widestereo::Filter filter = {};               // that was used
   double wall = 0, wall_min = 0, wall_max = 0;  // milliseconds, the first a median
   double on_device = 0;                         // of the median run, which the kernels are of
   std::vector<widestereo::KernelTime> kernels;
   std::size_t device_bytes = 0;
 
   double pixels() const { return static_cast<double>(size) * size; }
+  /// 0 where the device does not tell its time.
+  double per_second(double amount) const { return on_device > 0 ? 1000 * amount / on_device : 0; }
 };
 
 /// Matches the pair once to warm up, then `runs` times.

@@ -11,6 +11,16 @@
 
 namespace ws = widestereo;
 
+namespace {
+
+[[noreturn]] void refuse_without_effect(const std::string& option, const ws::DeviceInfo& device,
+                                        const std::string& other) {
+  throw ws::Error(option + " has no effect on " + device.name + "; leave it out, or choose " +
+                  other + ".");
+}
+
+}  // namespace
+
 MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& images,
                          const std::string& calibration) {
   if (settings.min_distance && settings.max_distance) return settings;
@@ -25,21 +35,20 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
   return settings;
 }
 
+void require_device_filter(const ws::DeviceInfo& device) {
+  if (!device.filters_intensities) refuse_without_effect("--filter device", device, "a GPU");
+}
+
 ws::Device open_device(const MatchSettings& settings) {
   ws::Device device = ws::Device::open(settings.device);
   if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
   const ws::DeviceInfo& info = device.info();
-  const auto refuse = [&info](const std::string& option, const std::string& other) {
-    throw ws::Error(option + " has no effect on " + info.name + "; leave it out, or choose " +
-                    other + ".");
-  };
   if (info.kind != ws::DeviceKind::vulkan) {
-    if (settings.device.validation) refuse("--validation", "--device vulkan");
-    if (!settings.device.pipeline_cache.empty()) refuse("--pipeline-cache", "--device vulkan");
+    if (settings.device.validation) refuse_without_effect("--validation", info, "--device vulkan");
+    if (!settings.device.pipeline_cache.empty())
+      refuse_without_effect("--pipeline-cache", info, "--device vulkan");
   }
-  if (settings.asks_for_device_filter() && !info.filters_intensities) {
-    refuse("--filter device", "a GPU");
-  }
+  if (settings.asks_for_device_filter()) require_device_filter(info);
   return device;
 }
 

@@ -25,6 +25,9 @@ struct MatchingRun {
 MatchSettings with_range(MatchSettings settings, const widestereo::CalibratedImages& images,
                          const std::string& calibration);
 
+/// Throws Error where the device has no texture units that filter intensities.
+void require_device_filter(const widestereo::DeviceInfo& device);
+
 /// Opens the device and reports, on standard error, those passed over. Throws Error where a given
 /// option has no effect on it.
 widestereo::Device open_device(const MatchSettings& settings);

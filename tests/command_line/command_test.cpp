@@ -774,6 +774,7 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   ASSERT_EQ(rows.size(), 1u);
   const nlohmann::json& row = rows[0];
   EXPECT_EQ(row["window_radius"], 3);
+  EXPECT_EQ(row["filter_used"], "exact");
   EXPECT_LE(row["milliseconds_min"], row["milliseconds"]);
   EXPECT_LE(row["milliseconds"], row["milliseconds_max"]);
   EXPECT_EQ(row["peaks"]["gflops"], 1.0);
@@ -812,6 +813,8 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   EXPECT_EQ(unknown.exit_code, 0) << unknown.output;
   EXPECT_EQ(unknown.output.find("% of"), std::string::npos) << unknown.output;
   expect_error("benchmark --sizes 64 --peak-gbps 10", "--devices");
+  expect_error("benchmark --devices cpu --sizes 64 --filter device",
+               "--filter device has no effect");
   // Nothing is timed, nor a header printed.
   expect_error("benchmark --devices cpu --devices nope --sizes 64", "no device \"nope\"");
   EXPECT_NE(run("benchmark --sizes 64 --plot " + file("speed.png")).exit_code, 0);
