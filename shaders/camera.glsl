@@ -30,8 +30,8 @@ struct CameraParameters {
   // radtan: k1, k2, p1, p2; where k1 and k2 are in shape: k5, k6, p1, p2
   real4 distortion;
   real4 prism;  // s1..s4
-  // cosine of the field of view's half angle; the largest theta (fisheyes) or squared undistorted
-  // radius (others) up to which the distortion increases; skew; radtan: k3; polynomial_fisheye: shear
+  // cosine of the field of view's half angle, -2 where nothing limits it; the largest theta (fisheyes) or squared
+  // undistorted radius (others) up to which the distortion increases; skew; radtan: k3; polynomial_fisheye: shear
   real4 domain;
   ivec4 size;  // width, height, model, 0
 };

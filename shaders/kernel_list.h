@@ -22,7 +22,7 @@ KERNEL(vote, REFERENCE)             // planes which most of the planes around ag
 KERNEL(vote_normal, REFERENCE)      // normals which most of the planes around agree with
 KERNEL(transfer_keep, REFERENCE)    // keeps a view's own planes, moved on from the previous frame
 KERNEL(renew, REFERENCE)            // starts a view from those
-KERNEL(interpolate, REFERENCE)      // intensities of a view at half pixels
+KERNEL(interpolate, REFERENCE)      // texels that samples of a view are filtered from: its pixels or half pixels
 KERNEL(subpixel, REFERENCE)         // moves what was measured to where each patch matches best
 KERNEL(ambiguity, REFERENCE)        // adds to the checks where another place matches better
 KERNEL(adopt_point, REFERENCE)      // takes regressed planes over whose costs follow later

@@ -69,10 +69,10 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
 }
 
 // Stores all that regress_pixel() needs of a neighbour: the variance of its match along the epipolar curve (px^2), the
-// speed there (pixels per unit of inverse distance), its inverse distance and intensity. The variance is that of the
-// patch's residual over the information of its gradients, net of what gain and offset of the intensities explain, too,
-// and of noise, and the square of half the displacement from the source's own plane, which exposes what the patch itself
-// cannot tell.
+// speed there (pixels per unit of inverse distance, 0 where nothing matches), its inverse distance and intensity. The
+// variance is that of the patch's residual over the information of its gradients, net of what gain and offset of the
+// intensities explain, too, and of noise, and the square of half the displacement from the source's own plane, which
+// exposes what the patch itself cannot tell.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);

@@ -135,9 +135,8 @@ struct PassParameters {
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last, which a view that is lower than others does not reach
-  uint candidates;  // adaptive search: bit k: candidate kind k is tried; interpolating: INTERPOLATE_CUBIC;
-                    // regression: REGRESS_NORMALS; adopting: HELD_UNSEEN; filling: reasons not to fill,
-                    // FILL_WITH_MATCHES
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS; adopting:
+                    // HELD_UNSEEN; checking: CHECK_FOR_VOTE; filling: reasons not to fill, FILL_WITH_MATCHES
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels

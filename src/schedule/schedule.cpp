@@ -62,7 +62,7 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, int image
 }
 
 /// The camera of an image downsampled by averaging 2x2 pixels; an odd side keeps a last, partial
-/// pixel.
+/// pixel, which is masked.
 View halved(const View& view) {
   View half = view;
   Camera& camera = half.camera;
