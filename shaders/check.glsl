@@ -10,11 +10,11 @@
 #define SUPPORT_DISPLACEMENT 1.0f
 // Of the surroundings' mean squared correlation: from a twentieth on, their planes count as known from the images.
 #define EVIDENCE_SCALE 20.0f
-// Differences that tell how intensity curves: a grid of this radius and step, and the pixels between their ends and
-// middles. All lie within an image's apron.
-#define CURVATURE_RADIUS 12
-#define CURVATURE_STEP 6
-#define CURVATURE_REACH 4
+// Where differences tell how intensity curves: on lines along both diagonals by turns, which reach this far and lie up to
+// so far beside the pixel, in steps of so many pixels both ways. All lie within an image's apron.
+#define CURVATURE_RADIUS 10
+#define CURVATURE_STEP 4
+#define CURVATURE_BESIDE 5
 // Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
 // standard deviation of half a grey level; its inverse.
 #define PER_CERTAIN_CURVATURE 3.3e5f
@@ -41,11 +41,11 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   return (sum_squares - sum * sum / n) / n;
 }
 
-// Variance of the noise in the reference patch, for which second differences along its rows are taken.
+// Variance of the noise in the reference patch, for which second differences along every other one of its rows are taken.
 FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
   float differences = 0.0f;
   float sum_curvature = 0.0f;
-  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; dy += 2) {
     IntensityRow row = intensity_row(CONTEXT REFERENCE, ivec2(pixel.x - WINDOW_RADIUS, pixel.y + dy));
     float last = MASKED_INTENSITY;
     float last_but_one = MASKED_INTENSITY;
@@ -63,23 +63,24 @@ FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
 }
 
 // How far intensity curves around the pixel by more than noise does, 0 to 1: where it is constant or a gradient, patches
-// match anywhere, and planes are those of what lies around, or of nothing. Differences lie along both diagonals by turns.
+// match anywhere, and planes are those of what lies around, or of nothing.
 FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
   float n = 0.0f;
   float sum = 0.0f;
-  int way = CURVATURE_REACH;
-  for (int dy = -CURVATURE_RADIUS; dy <= CURVATURE_RADIUS; dy += CURVATURE_STEP) {
-    for (int dx = -CURVATURE_RADIUS; dx <= CURVATURE_RADIUS; dx += CURVATURE_STEP) {
-      ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-      float before = intensity_at(CONTEXT REFERENCE, ivec2(q.x - way, q.y - CURVATURE_REACH));
-      float middle = intensity_at(CONTEXT REFERENCE, q);
-      float after = intensity_at(CONTEXT REFERENCE, ivec2(q.x + way, q.y + CURVATURE_REACH));
-      way = -way;
-      if (min(min(before, middle), after) < 0.0f) continue;
-      float curvature = (before - middle) + (after - middle);
-      n += 1.0f;
-      sum += curvature * curvature;
+  int way = 1;
+  for (int beside = -CURVATURE_BESIDE; beside <= CURVATURE_BESIDE; beside += 2) {
+    float last = MASKED_INTENSITY;
+    float last_but_one = MASKED_INTENSITY;
+    for (int along = -CURVATURE_RADIUS; along <= CURVATURE_RADIUS; along += CURVATURE_STEP) {
+      float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + way * along + beside, pixel.y + along - way * beside));
+      float curvature = (a - last) - (last - last_but_one);
+      bool usable = min(a, min(last, last_but_one)) >= 0.0f;
+      n += usable ? 1.0f : 0.0f;
+      sum += usable ? curvature * curvature : 0.0f;
+      last_but_one = last;
+      last = a;
     }
+    way = -way;
   }
   float net = sum / (6.0f * max(n, 1.0f)) - min(noise, LARGEST_NOISE);
   return clamp(PER_CERTAIN_CURVATURE * net, 0.0f, 1.0f);
