@@ -6,6 +6,9 @@
 #define FAR_SHARE 0.25f
 // Displacement (source pixels) up to which planes belong to one surface.
 #define SURFACE_DISPLACEMENT 1.0f
+// In which the nearest accepted pixels are looked for, and what stands for none.
+#define DIRECTIONS 8
+#define NO_PLACE 3e38f
 // How much worse than the pixel's own a plane may match that takes its place.
 #define LARGEST_EXTRA_COST 0.1f
 
@@ -17,9 +20,15 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float intensity = intensity_at(CONTEXT REFERENCE, pixel);
   float inverse_scale = PARAMETERS.support.y;
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  vec3 planes[8];
-  float weights[8];
-  int count = 0;
+  // Sorted by the inverse distance that planes have at the pixel; constant indices alone keep them in registers.
+  float places[DIRECTIONS];
+  float weights[DIRECTIONS];
+  int pixels[DIRECTIONS];
+  UNROLL for (int i = 0; i < DIRECTIONS; ++i) {
+    places[i] = NO_PLACE;
+    weights[i] = 0.0f;
+    pixels[i] = 0;
+  }
   float total = 0.0f;
   uint reasons = uint(check_at(CONTEXT REFERENCE, pixel).w);
   bool wanted = reasons != 0u && (reasons & PASS.candidates) == 0u;
@@ -40,35 +49,49 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec4 held = hypothesis_at(CONTEXT REFERENCE, q);
     vec3 m = vec3(held.x, held.y, held.z);
     if (!admissible(CONTEXT ray, m)) continue;
+    float place = dot(m, ray);
     float weight =
         1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
-    int place = count;
-    while (place > 0 && dot(planes[place - 1], ray) > dot(m, ray)) {
-      planes[place] = planes[place - 1];
-      weights[place] = weights[place - 1];
-      --place;
-    }
-    planes[place] = m;
-    weights[place] = weight;
+    int index = q.y * size.x + q.x;
     total += weight;
-    ++count;
+    // All from its place on move on by one, so that of equal ones the first found stays first.
+    bool comes_first = false;
+    UNROLL for (int k = 0; k < DIRECTIONS; ++k) {
+      comes_first = comes_first || place < places[k];
+      float next_place = comes_first ? places[k] : place;
+      float next_weight = comes_first ? weights[k] : weight;
+      int next_index = comes_first ? pixels[k] : index;
+      places[k] = comes_first ? place : places[k];
+      weights[k] = comes_first ? weight : weights[k];
+      pixels[k] = comes_first ? index : pixels[k];
+      place = next_place;
+      weight = next_weight;
+      index = next_index;
+    }
   }
   vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
-  if (count > 0) {
-    int chosen = 0;
+  if (total > 0.0f) {
+    float w = places[0];
     float sum = weights[0];
-    while (sum < FAR_SHARE * total && chosen + 1 < count) sum += weights[++chosen];
-    float w = dot(planes[chosen], ray);
+    UNROLL for (int i = 1; i < DIRECTIONS; ++i) {
+      if (sum >= FAR_SHARE * total || places[i] == NO_PLACE) continue;
+      w = places[i];
+      sum += weights[i];
+    }
     float reach = SURFACE_DISPLACEMENT / max(speed_in_sources(CONTEXT pixel, ray, w), 1e-9f);
-    int first = 0;
-    while (dot(planes[first], ray) < w - reach) ++first;
-    int end = first;
     float of_surface = 0.0f;
-    while (end < count && dot(planes[end], ray) <= w + reach) of_surface += weights[end++];
-    chosen = first;
-    sum = weights[first];
-    while (sum < 0.5f * of_surface && chosen + 1 < end) sum += weights[++chosen];
-    prior = vec4(planes[chosen], 1.0f);
+    UNROLL for (int i = 0; i < DIRECTIONS; ++i) {
+      of_surface += places[i] >= w - reach && places[i] <= w + reach ? weights[i] : 0.0f;
+    }
+    int chosen = 0;
+    sum = 0.0f;
+    UNROLL for (int i = 0; i < DIRECTIONS; ++i) {
+      if (places[i] < w - reach || places[i] > w + reach || (sum > 0.0f && sum >= 0.5f * of_surface)) continue;
+      chosen = pixels[i];
+      sum += weights[i];
+    }
+    vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(chosen % size.x, chosen / size.x));
+    prior = vec4(plane.x, plane.y, plane.z, 1.0f);
   }
   store_prior(CONTEXT REFERENCE, pixel, prior);
 }
