@@ -14,7 +14,7 @@
 // so far beside the pixel, in steps of so many pixels both ways. All lie within an image's apron.
 #define CURVATURE_RADIUS 10
 #define CURVATURE_STEP 4
-#define CURVATURE_BESIDE 5
+#define CURVATURE_BESIDE 6
 // Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
 // standard deviation of half a grey level; its inverse.
 #define PER_CERTAIN_CURVATURE 3.3e5f
