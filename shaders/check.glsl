@@ -41,48 +41,63 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
   return (sum_squares - sum * sum / n) / n;
 }
 
+// Squared second differences of intensities on lines, of which some are masked.
+struct Curvature {
+  float last;
+  float last_but_one;
+  float differences;
+  float sum;
+};
+
+FN void begin_curvature(OUT(Curvature) curvature) {
+  curvature.differences = 0.0f;
+  curvature.sum = 0.0f;
+}
+
+FN void begin_line(INOUT(Curvature) curvature) {
+  curvature.last = MASKED_INTENSITY;
+  curvature.last_but_one = MASKED_INTENSITY;
+}
+
+FN void add_intensity(INOUT(Curvature) curvature, float a) {
+  float difference = (a - curvature.last) - (curvature.last - curvature.last_but_one);
+  bool usable = min(a, min(curvature.last, curvature.last_but_one)) >= 0.0f;
+  curvature.differences += usable ? 1.0f : 0.0f;
+  curvature.sum += usable ? difference * difference : 0.0f;
+  curvature.last_but_one = curvature.last;
+  curvature.last = a;
+}
+
+// The variance of noise that alone would make them.
+FN float variance_of(Curvature curvature) { return curvature.sum / (6.0f * max(curvature.differences, 1.0f)); }
+
 // Variance of the noise in the reference patch, for which second differences along every other one of its rows are taken.
 FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
-  float differences = 0.0f;
-  float sum_curvature = 0.0f;
+  Curvature curvature;
+  begin_curvature(curvature);
   for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; dy += 2) {
     IntensityRow row = intensity_row(CONTEXT REFERENCE, ivec2(pixel.x - WINDOW_RADIUS, pixel.y + dy));
-    float last = MASKED_INTENSITY;
-    float last_but_one = MASKED_INTENSITY;
-    for (int dx = 0; dx <= 2 * WINDOW_RADIUS; ++dx) {
-      float a = intensity_in_row(row, dx);
-      float curvature = (a - last) - (last - last_but_one);
-      bool usable = min(a, min(last, last_but_one)) >= 0.0f;
-      differences += usable ? 1.0f : 0.0f;
-      sum_curvature += usable ? curvature * curvature : 0.0f;
-      last_but_one = last;
-      last = a;
-    }
+    begin_line(curvature);
+    for (int dx = 0; dx <= 2 * WINDOW_RADIUS; ++dx) add_intensity(curvature, intensity_in_row(row, dx));
   }
-  return sum_curvature / (6.0f * max(differences, 1.0f));
+  return variance_of(curvature);
 }
 
 // How far intensity curves around the pixel by more than noise does, 0 to 1: where it is constant or a gradient, patches
 // match anywhere, and planes are those of what lies around, or of nothing.
 FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
-  float n = 0.0f;
-  float sum = 0.0f;
+  Curvature curvature;
+  begin_curvature(curvature);
   int way = 1;
   for (int beside = -CURVATURE_BESIDE; beside <= CURVATURE_BESIDE; beside += 2) {
-    float last = MASKED_INTENSITY;
-    float last_but_one = MASKED_INTENSITY;
+    begin_line(curvature);
     for (int along = -CURVATURE_RADIUS; along <= CURVATURE_RADIUS; along += CURVATURE_STEP) {
-      float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + way * along + beside, pixel.y + along - way * beside));
-      float curvature = (a - last) - (last - last_but_one);
-      bool usable = min(a, min(last, last_but_one)) >= 0.0f;
-      n += usable ? 1.0f : 0.0f;
-      sum += usable ? curvature * curvature : 0.0f;
-      last_but_one = last;
-      last = a;
+      ivec2 q = ivec2(pixel.x + way * along + beside, pixel.y + along - way * beside);
+      add_intensity(curvature, intensity_at(CONTEXT REFERENCE, q));
     }
     way = -way;
   }
-  float net = sum / (6.0f * max(n, 1.0f)) - min(noise, LARGEST_NOISE);
+  float net = variance_of(curvature) - min(noise, LARGEST_NOISE);
   return clamp(PER_CERTAIN_CURVATURE * net, 0.0f, 1.0f);
 }
 
