@@ -73,7 +73,7 @@ TEST_P(HiddenInOneSource, IsMatchedInTheOther) {
   }
   ASSERT_GT(pixels, 100) << "hidden in the first source";
   RecordProperty("wrong", std::to_string(static_cast<double>(wrong) / pixels));
-  EXPECT_LT(wrong, 0.1 * pixels) << "of " << pixels;
+  EXPECT_LT(wrong, 0.02 * pixels) << "of " << pixels;
 }
 
 }  // namespace
