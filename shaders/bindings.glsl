@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Images are 2D arrays: of texels one
-// for each level, with a layer for each of its views, as texture units must clamp to them; of maps one for all levels, in
-// which coarse views share layers (src/vulkan/atlas.h). Intensities lie in a buffer, for loads from images take texture
-// units, which have the samples to filter.
+// Vulkan's side of portable.h: resources, accessors and the pixel of a thread. Texels are images, 2D arrays of one for
+// each level with a layer for each of its views, as texture units must clamp to them. Maps and intensities of all views
+// lie in buffers, row by row: loads from images take texture units, which have the samples to filter.
 //
-// Every kernel is compiled twice, for images that are read with the same bits. GPUs gather or filter four texels in one
+// Every kernel is compiled twice, for what is read with the same bits. GPUs gather or filter four texels in one
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
-// and have the four numbers of a sample in one texel, which takes them much less than four texels of one. Where texture
-// units filter, `interpolate` is compiled once more, for texels of half precision (HALF_PRECISION).
+// and have the four numbers of a sample in one texel, which takes them much less than four texels of one; so they read
+// maps as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels of half
+// precision (HALF_PRECISION).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -28,23 +28,35 @@ layout(constant_id = 6) const int FILTER = 0;
 #endif
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };
-layout(set = 0, binding = 1, std430) buffer IntensityBlock { float intensities[]; };
-layout(set = 0, binding = 2, rgba32f) readonly uniform image2DArray rays;
-layout(set = 0, binding = 3, rgba32f) uniform image2DArray hypotheses;  // and, in further layers, priors and checks
-layout(set = 0, binding = 4) uniform sampler2DArray texel_texture;
-layout(set = 0, binding = 5, std430) buffer NearestBlock { uint transfer_nearest[]; };
-layout(set = 0, binding = 6, std430) buffer WinnerBlock { uint transfer_winner[]; };
-#ifdef TEXEL_LOADS
-layout(set = 0, binding = 7, rgba32f) uniform image2DArray texels;  // with the right, lower and lower right one
-#elif defined HALF_PRECISION
-layout(set = 0, binding = 7, r16f) uniform image2DArray texels;
-#else
-layout(set = 0, binding = 7, r32f) uniform image2DArray texels;
-#endif
-layout(set = 0, binding = 8, std140) uniform PlaceBlock {
-  ivec4 map_places[MAX_VIEWS];        // x, y and layer of a view's pixel (0, 0); layers of one kind of map
-  ivec4 intensity_places[MAX_VIEWS];  // index of a view's pixel (0, 0), and what lies between rows
+layout(set = 0, binding = 1, std140) uniform PlaceBlock {
+  ivec4 places[MAX_VIEWS];  // index of a view's pixel (0, 0) and what lies between rows: of maps; of intensities
 };
+layout(set = 0, binding = 2, std430) buffer IntensityBlock { float intensities[]; };
+#ifdef TEXEL_LOADS
+layout(set = 0, binding = 3, rgba32f) readonly uniform imageBuffer rays;
+layout(set = 0, binding = 4, rgba32f) uniform imageBuffer hypotheses;
+layout(set = 0, binding = 5, rgba32f) uniform imageBuffer priors;
+layout(set = 0, binding = 6, rgba32f) uniform imageBuffer checks;
+#define LOAD_MAP(map, index) imageLoad(map, index)
+#define STORE_MAP(map, index, value) imageStore(map, index, value)
+#else
+layout(set = 0, binding = 3, std430) readonly buffer RayBlock { vec4 rays[]; };
+layout(set = 0, binding = 4, std430) buffer HypothesisBlock { vec4 hypotheses[]; };
+layout(set = 0, binding = 5, std430) buffer PriorBlock { vec4 priors[]; };
+layout(set = 0, binding = 6, std430) buffer CheckBlock { vec4 checks[]; };
+#define LOAD_MAP(map, index) map[index]
+#define STORE_MAP(map, index, value) map[index] = value
+#endif
+layout(set = 0, binding = 7) uniform sampler2DArray texel_texture;
+#ifdef TEXEL_LOADS
+layout(set = 0, binding = 8, rgba32f) uniform image2DArray texels;  // with the right, lower and lower right one
+#elif defined HALF_PRECISION
+layout(set = 0, binding = 8, r16f) uniform image2DArray texels;
+#else
+layout(set = 0, binding = 8, r32f) uniform image2DArray texels;
+#endif
+layout(set = 0, binding = 9, std430) buffer NearestBlock { uint transfer_nearest[]; };
+layout(set = 0, binding = 10, std430) buffer WinnerBlock { uint transfer_winner[]; };
 layout(push_constant) uniform PassBlock {
   PassParameters pass;
 #ifdef HAS_CONVERSION
@@ -55,20 +67,20 @@ layout(push_constant) uniform PassBlock {
 #define VIEW_OF_LAUNCH int(gl_WorkGroupID.z)
 
 // Of the view whose pixels are updated, read once: lavapipe reads blocks lane by lane, in loops each time anew.
-ivec4 map_place_of_reference = map_places[REFERENCE];
-ivec4 intensity_place_of_reference = intensity_places[REFERENCE];
+ivec4 place_of_reference = places[REFERENCE];
 
-ivec4 map_place(int view) { return view == REFERENCE ? map_place_of_reference : map_places[view]; }
+ivec4 place_of(int view) { return view == REFERENCE ? place_of_reference : places[view]; }
 
-ivec3 in_maps(int view, ivec2 p) { return map_place(view).xyz + ivec3(p, 0); }
-
-ivec3 in_further_maps(int kind, int view, ivec2 p) { return in_maps(view, p) + ivec3(0, 0, kind * map_place(view).w); }
+int in_maps(int view, ivec2 p) {
+  ivec4 place = place_of(view);
+  return place.x + p.y * place.y + p.x;
+}
 
 #define IntensityRow int
 
 IntensityRow intensity_row(int view, ivec2 p) {
-  ivec4 place = view == REFERENCE ? intensity_place_of_reference : intensity_places[view];
-  return place.x + p.y * place.y + p.x;
+  ivec4 place = place_of(view);
+  return place.z + p.y * place.w + p.x;
 }
 
 float intensity_in_row(IntensityRow row, int dx) { return intensities[row + dx]; }
@@ -78,7 +90,13 @@ int layer_of_texels(int view) { return view - pass.first_view; }
 
 ivec3 in_texels(int view, ivec2 p) { return ivec3(p + TEXEL_APRON, layer_of_texels(view)); }
 
-vec4 ray_at(int view, ivec2 p) { return imageLoad(rays, in_maps(view, p)); }
+#define RayRow int
+
+RayRow ray_row(int view, ivec2 p) { return in_maps(view, p); }
+
+vec4 ray_in_row(RayRow row, int dx) { return LOAD_MAP(rays, row + dx); }
+
+vec4 ray_at(int view, ivec2 p) { return LOAD_MAP(rays, in_maps(view, p)); }
 
 #ifdef TEXEL_LOADS
 
@@ -114,21 +132,21 @@ void store_texel(int view, ivec2 p, vec4 taps) {
   imageStore(texels, in_texels(view, p), taps);
 }
 
-vec4 hypothesis_at(int view, ivec2 p) { return imageLoad(hypotheses, in_maps(view, p)); }
+vec4 hypothesis_at(int view, ivec2 p) { return LOAD_MAP(hypotheses, in_maps(view, p)); }
 
-void store_hypothesis(int view, ivec2 p, vec4 h) { imageStore(hypotheses, in_maps(view, p), h); }
+void store_hypothesis(int view, ivec2 p, vec4 h) { STORE_MAP(hypotheses, in_maps(view, p), h); }
 
 void store_intensity(int view, ivec2 p, float intensity) {
   intensities[intensity_row(view, p)] = intensity;
 }
 
-vec4 prior_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(1, view, p)); }
+vec4 prior_at(int view, ivec2 p) { return LOAD_MAP(priors, in_maps(view, p)); }
 
-void store_prior(int view, ivec2 p, vec4 m) { imageStore(hypotheses, in_further_maps(1, view, p), m); }
+void store_prior(int view, ivec2 p, vec4 m) { STORE_MAP(priors, in_maps(view, p), m); }
 
-vec4 check_at(int view, ivec2 p) { return imageLoad(hypotheses, in_further_maps(2, view, p)); }
+vec4 check_at(int view, ivec2 p) { return LOAD_MAP(checks, in_maps(view, p)); }
 
-void store_check(int view, ivec2 p, vec4 c) { imageStore(hypotheses, in_further_maps(2, view, p), c); }
+void store_check(int view, ivec2 p, vec4 c) { STORE_MAP(checks, in_maps(view, p), c); }
 
 int transfer_index(ivec2 p) { return p.y * parameters.cameras[REFERENCE].size.x + p.x; }
 

@@ -53,6 +53,16 @@ FN vec2 texel_at(CONTEXT_ARGUMENT vec2 position) {
   return texel;
 }
 
+// A camera that projects into them.
+FN CameraParameters camera_of_texels(CONTEXT_ARGUMENT CameraParameters camera, int model) {
+  vec2 scale = texel_scale(CONTEXT_ONLY);
+  vec2 centre = texel_at(CONTEXT vec2(camera.intrinsics.z, camera.intrinsics.w));
+  camera.intrinsics = vec4(scale.x * camera.intrinsics.x, scale.y * camera.intrinsics.y, centre.x, centre.y);
+  camera.domain.z = scale.x * camera.domain.z;
+  if (model == CAMERA_POLYNOMIAL_FISHEYE) camera.domain.w = scale.y * camera.domain.w;
+  return camera;
+}
+
 // Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others, and every image
 // is surrounded by masked ones. The weights are exact, or those of the texture units (1/256 on most GPUs).
 FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
@@ -307,7 +317,9 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   PatchStart start;
   if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, WARP != WARP_EXACT, start)) return INVALID_COST;
 
-  ivec4 size = PARAMETERS.cameras[reference].size;
+  int last_row = PARAMETERS.cameras[reference].size.y - 1;
+  CameraParameters camera_of_samples = camera;
+  if (WARP == WARP_EXACT) camera_of_samples = camera_of_texels(CONTEXT camera, model);
   float inverse_scale = PARAMETERS.support.x;
   float samples = 0.0f;
   float n = 0.0f;  // sum of weights
@@ -320,6 +332,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
     int first = first_column(CONTEXT WINDOW_RADIUS, dy);
     ivec2 begin = ivec2(pixel.x + first, pixel.y + dy);
     IntensityRow intensities_of_row = intensity_row(CONTEXT reference, begin);
+    // The image ends where its intensities are masked.
+    RayRow rays_of_row = ray_row(CONTEXT reference, ivec2(begin.x, clamp(begin.y, 0, last_row)));
     RowMap row;
     if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
     UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
@@ -327,10 +341,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       vec2 texel;
       bool seen = true;
       if (WARP == WARP_EXACT) {
-        // The image ends where its intensities are masked.
-        vec4 ray = ray_at(CONTEXT reference, nearest_in_image(size, ivec2(begin.x + dx, begin.y)));
-        seen = warp_ray(start.warp, camera, model, vec3(ray.x, ray.y, ray.z), texel);
-        texel = texel_at(CONTEXT texel);
+        vec4 ray = ray_in_row(rays_of_row, dx);
+        seen = warp_ray(start.warp, camera_of_samples, model, vec3(ray.x, ray.y, ray.z), texel);
       } else {
         texel = map_offset(CONTEXT row, float(dx));
       }

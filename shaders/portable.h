@@ -6,6 +6,9 @@
 //
 // A back end provides, before including the algorithm:
 //   vec4  ray_at(view, pixel)               unit ray and 1 / 0 (usable or not), zeros where none
+//   RayRow ray_row(view, pixel), vec4 ray_in_row(row, dx)
+//                                           the same, dx pixels to the right of that pixel, from one address for a row; of
+//                                           a column up to APRON pixels outside the image any ray
 //   float intensity_at(view, pixel)         [0, 1]; MASKED_INTENSITY where masked and up to APRON pixels outside
 //   IntensityRow intensity_row(view, pixel), float intensity_in_row(row, dx)
 //                                           the same, dx pixels to the right of that pixel, from one address for a row

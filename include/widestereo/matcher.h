@@ -124,10 +124,11 @@ class Matcher {
   StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
                           const Progress& progress = {});
 
-  /// Whether each kernel is timed (StereoResult::times), as it is unless this says otherwise. On
-  /// CUDA devices this makes them follow each other; without, and without a progress function,
-  /// those of different views may overlap, as they do in a CudaMatcher. Other devices time them in
-  /// any case.
+  /// Whether each kernel is timed (StereoResult::times), as it is unless this says otherwise. A
+  /// GPU then finishes each before the next. Without, CUDA devices let those of different views
+  /// overlap where there is no progress function, as a CudaMatcher does, and Vulkan devices start
+  /// each as soon as barriers allow, as in a VulkanMatcher's commands. The CPU back end times
+  /// them in any case.
   void time_kernels(bool each);
 
  private:

@@ -55,6 +55,14 @@ inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return to_vec4(context.views[view].rays(p.y, p.x));
 }
+struct RayRow {
+  const cv::Mat_<cv::Vec4f>& rays;
+  ivec2 first;
+};
+inline RayRow ray_row(CONTEXT_ARGUMENT int view, ivec2 p) { return {context.views[view].rays, p}; }
+inline vec4 ray_in_row(const RayRow& row, int dx) {
+  return to_vec4(row.rays(row.first.y, clamp(row.first.x + dx, 0, row.rays.cols - 1)));
+}
 using IntensityRow = const float*;
 inline IntensityRow intensity_row(CONTEXT_ARGUMENT int view, ivec2 p) {
   return &context.views[view].intensities(p.y + APRON, p.x + APRON);

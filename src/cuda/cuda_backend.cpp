@@ -141,7 +141,8 @@ void CudaBackend::make_maps() {
     const std::string& name = target_.name;
     const cudaStream_t stream = stream_.get();
     ViewMaps& maps = maps_.emplace_back();
-    maps.rays = DeviceArray<float4>(pixels, stream, name, "the viewing rays");
+    // Read so far before the first and after the last row.
+    maps.rays = DeviceArray<float4>(pixels + 2 * APRON, stream, name, "the viewing rays");
     maps.intensities = DeviceImage(with_apron(size), APRON, sizeof(float), stream, name);
     maps.texels = DeviceImage(size_of_texels(size, constants_), constants_.texels_per_pixel * APRON,
                               bytes_of_texel(constants_), stream, name);
@@ -150,7 +151,7 @@ void CudaBackend::make_maps() {
     maps.checks = DeviceArray<float4>(pixels, stream, name, "the consistency maps");
     maps.priors = DeviceArray<float4>(pixels, stream, name, "the planes' priors");
     context_.views[maps_.size() - 1] = {
-        maps.rays.get(),           static_cast<float*>(maps.intensities.get()),
+        maps.rays.get() + APRON,   static_cast<float*>(maps.intensities.get()),
         maps.texels.get(),         maps.texture.get(),
         maps.hypotheses.get(),     maps.checks.get(),
         maps.priors.get(),         size.width,
@@ -200,7 +201,7 @@ cv::Mat CudaBackend::download(const void* memory, int view) {
 }
 
 void CudaBackend::set_rays(int view, const cv::Mat& rays) {
-  upload(maps_.at(static_cast<std::size_t>(view)).rays.get(), size(view).width, view, rays,
+  upload(maps_.at(static_cast<std::size_t>(view)).rays.get() + APRON, size(view).width, view, rays,
          CV_32FC4);
 }
 void CudaBackend::set_intensity(int view, const cv::Mat& intensity) {

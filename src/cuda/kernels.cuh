@@ -63,8 +63,13 @@ struct Algorithm {
   FN vec4 to_vec4(float4 v) { return vec4(v.x, v.y, v.z, v.w); }
   FN float4 to_float4(vec4 v) { return make_float4(v.x, v.y, v.z, v.w); }
 
+  using RayRow = const float4*;
+  FN RayRow ray_row(CONTEXT_ARGUMENT int view, ivec2 p) {
+    return context.views[view].rays + index_of(CONTEXT view, p);
+  }
+  FN vec4 ray_in_row(RayRow row, int dx) { return to_vec4(__ldg(row + dx)); }
   FN vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
-    return to_vec4(__ldg(context.views[view].rays + index_of(CONTEXT view, p)));
+    return ray_in_row(ray_row(CONTEXT view, p), 0);
   }
   FN float* intensity_address(CONTEXT_ARGUMENT int view, ivec2 p) {
     return context.views[view].intensities + (p.y * context.views[view].stride + p.x);

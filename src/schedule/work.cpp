@@ -28,6 +28,11 @@ int texel_at(const KernelConstants& c) {
   return (c.texels_per_pixel > 1 ? 2 : 0) + (c.filter == static_cast<int>(Filter::exact) ? 0 : 2);
 }
 
+/// Where texels are not pixels.
+int camera_of_texels(int model) {
+  return model == static_cast<int>(CameraModel::polynomial_fisheye) ? 4 : 3;
+}
+
 /// Texture units filter by themselves.
 int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) ? 11 : 0; }
 
@@ -192,10 +197,12 @@ PatchOperations patch_operations(const KernelConstants& c) {
   const int sums = 2 + 1 + 8 + (c.weighted != 0 ? 3 : 0);
   PatchOperations operations;
   operations.of_sample =
-      weighting + (exact ? warp_ray + texel_at(c) : map_offset) + sample_image(c.filter) + sums;
+      weighting + (exact ? warp_ray : map_offset) + sample_image(c.filter) + sums;
   operations.of_patch =
       side_of_source + warp_through + warp_ray + texel_at(c) + sample_image(c.filter) + zncc_cost;
-  if (!exact) {
+  if (exact) {
+    operations.of_patch += texel_at(c) + (is_scaled ? camera_of_texels(c.camera_model) : 0);
+  } else {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;
     operations.of_patch += anchors * warp_ray + 2 * map_axis + texel_at(c) +

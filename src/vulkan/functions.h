@@ -35,6 +35,8 @@ namespace widestereo {
   X(vkDestroyBuffer)                              \
   X(vkGetBufferMemoryRequirements)                \
   X(vkBindBufferMemory)                           \
+  X(vkCreateBufferView)                           \
+  X(vkDestroyBufferView)                          \
   X(vkCreateImage)                                \
   X(vkDestroyImage)                               \
   X(vkGetImageMemoryRequirements)                 \
@@ -80,7 +82,6 @@ namespace widestereo {
   X(vkCmdFillBuffer)                              \
   X(vkCmdClearColorImage)                         \
   X(vkCmdCopyBufferToImage)                       \
-  X(vkCmdCopyImageToBuffer)                       \
   X(vkCmdResetQueryPool)                          \
   X(vkCmdWriteTimestamp)
 // clang-format on

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "vulkan/memory.h"
 
-#include <limits>
-
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -63,6 +61,14 @@ Buffer make_buffer(const VulkanContext& context, VkDeviceSize bytes, VkBufferUsa
   return result;
 }
 
+void require_buffer_limit(const VulkanContext& context, VkDeviceSize bytes, const char* limit,
+                          VkDeviceSize offered, const std::string& purpose) {
+  if (bytes <= offered) return;
+  throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " of " +
+              mebibytes(bytes) + ": its " + limit + " is " + mebibytes(offered) +
+              "; use smaller images or another device.");
+}
+
 void require_image_limits(const VulkanContext& context, VkFormat format, cv::Size size, int layers,
                           VkImageUsageFlags usage, const std::string& purpose) {
   const VkImageFormatProperties limits = context.image_limits(format, usage);
@@ -94,15 +100,40 @@ void require_image_limits(const VulkanContext& context, VkFormat format, cv::Siz
 
 Buffer make_device_buffer(const VulkanContext& context, VkDeviceSize bytes,
                           VkBufferUsageFlags usage, const std::string& purpose) {
-  const VkDeviceSize limit = (usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) != 0
-                                 ? context.properties().limits.maxStorageBufferRange
-                                 : std::numeric_limits<VkDeviceSize>::max();
-  if (bytes > limit) {
-    throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " of " +
-                mebibytes(bytes) + ": its maxStorageBufferRange is " + mebibytes(limit) +
-                "; use smaller images or another device.");
+  if ((usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) != 0) {
+    require_buffer_limit(context, bytes, "maxStorageBufferRange",
+                         context.properties().limits.maxStorageBufferRange, purpose);
   }
   return make_buffer(context, bytes, usage, device_memory_type, purpose);
+}
+
+MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements,
+                          VkDescriptorType type, const std::string& purpose) {
+  constexpr VkDeviceSize bytes_of_element = 4 * sizeof(float);
+  const VkDeviceSize bytes = elements * bytes_of_element;
+  constexpr VkBufferUsageFlags transfers =
+      VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
+  MapBuffer map;
+  if (type == VK_DESCRIPTOR_TYPE_STORAGE_BUFFER) {
+    map.buffer =
+        make_device_buffer(context, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | transfers, purpose);
+    return map;
+  }
+  require_buffer_limit(context, bytes, "maxTexelBufferElements times 16 bytes",
+                       context.properties().limits.maxTexelBufferElements * bytes_of_element,
+                       purpose);
+  map.buffer = make_device_buffer(context, bytes,
+                                  VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT | transfers, purpose);
+  VkBufferViewCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
+  info.buffer = map.buffer.handle.get();
+  info.format = VK_FORMAT_R32G32B32A32_SFLOAT;
+  info.range = VK_WHOLE_SIZE;
+  VkBufferView view = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateBufferView(context.device(), &info, nullptr, &view),
+                "make a view of " + purpose);
+  map.view = context.own(view, context.vk().vkDestroyBufferView);
+  return map;
 }
 
 Buffer make_staging_buffer(const VulkanContext& context, VkDeviceSize bytes) {

@@ -16,6 +16,13 @@ struct Buffer {
   void* mapped = nullptr;
 };
 
+/// A buffer that kernels read and write as one array of four floats: as a storage buffer, or, with
+/// a view, as a texel buffer.
+struct MapBuffer {
+  Buffer buffer;
+  Handle<VkBufferView> view;
+};
+
 /// A 2D array image with memory of its own and a view of all layers.
 struct LayeredImage {
   Handle<VkDeviceMemory> memory;
@@ -27,6 +34,10 @@ struct LayeredImage {
 /// `purpose` names the object in messages. All throw Error naming the device and what is missing.
 Buffer make_device_buffer(const VulkanContext& context, VkDeviceSize bytes,
                           VkBufferUsageFlags usage, const std::string& purpose);
+
+/// `type`: of its descriptors.
+MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements,
+                          VkDescriptorType type, const std::string& purpose);
 
 /// Host-visible, coherent and, where there is such memory, cached: for uploads and downloads.
 Buffer make_staging_buffer(const VulkanContext& context, VkDeviceSize bytes);

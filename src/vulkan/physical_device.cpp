@@ -137,8 +137,7 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   }
   if (!compute_queue_family(vk, device)) return "it has no compute queue; use another device.";
   if (!has_format(vk, device, VK_FORMAT_R32G32B32A32_SFLOAT,
-                  VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_SRC_BIT |
-                      VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
+                  VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
     return "it lacks storage images of four 32-bit floats; use another device.";
   }
   if (!has_format(vk, device, VK_FORMAT_R32_SFLOAT,
@@ -157,8 +156,16 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   if (limits.maxComputeWorkGroupInvocations < 64) {
     return too_low("maxComputeWorkGroupInvocations", 64, limits.maxComputeWorkGroupInvocations);
   }
-  if (limits.maxPerStageDescriptorStorageImages < 4) {
-    return too_low("maxPerStageDescriptorStorageImages", 4,
+  // With those of conversions; software devices bind maps as storage images.
+  const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  const std::uint32_t buffers = in_software ? 4 : 8;
+  const std::uint32_t images = in_software ? 5 : 1;
+  if (limits.maxPerStageDescriptorStorageBuffers < buffers) {
+    return too_low("maxPerStageDescriptorStorageBuffers", buffers,
+                   limits.maxPerStageDescriptorStorageBuffers);
+  }
+  if (limits.maxPerStageDescriptorStorageImages < images) {
+    return too_low("maxPerStageDescriptorStorageImages", images,
                    limits.maxPerStageDescriptorStorageImages);
   }
   return "";

@@ -104,14 +104,16 @@ void Pipelines::make_layouts(const VulkanContext& context) {
   };
   const std::array bindings = {
       binding(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
+      binding(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
       binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
-      binding(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
-      binding(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
+      binding(binding_rays, type_of_maps()),
+      binding(binding_hypotheses, type_of_maps()),
+      binding(binding_priors, type_of_maps()),
+      binding(binding_checks, type_of_maps()),
       binding(binding_texel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER),
+      binding(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
       binding(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
-      binding(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE),
-      binding(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
   };
   set_layout_ = make_set_layout(context, bindings);
   const VkDescriptorSetLayout set_layout = set_layout_.get();

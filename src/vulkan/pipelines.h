@@ -13,14 +13,16 @@ namespace widestereo {
 /// Bindings of shaders/bindings.glsl.
 enum Binding : std::uint32_t {
   binding_parameters = 0,
-  binding_intensities = 1,
-  binding_rays = 2,
-  binding_hypotheses = 3,
-  binding_texel_texture = 4,
-  binding_nearest = 5,
-  binding_winner = 6,
-  binding_texels = 7,
-  binding_places = 8,
+  binding_places = 1,
+  binding_intensities = 2,
+  binding_rays = 3,
+  binding_hypotheses = 4,
+  binding_priors = 5,
+  binding_checks = 6,
+  binding_texel_texture = 7,
+  binding_texels = 8,
+  binding_nearest = 9,
+  binding_winner = 10,
 };
 
 /// How many cover so many pixels of a row or a column.
@@ -43,13 +45,17 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 class Pipelines {
  public:
   /// `sampled`: texels are read through the texture units instead of as storage images, which
-  /// hold them in another format (shaders/bindings.glsl). Those that texture units filter
+  /// hold them in another format, and maps as storage buffers instead of texel buffers
+  /// (shaders/bindings.glsl). Those that texture units filter
   /// have half precision where the device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);
 
   bool sampled() const { return sampled_; }
   bool half_precision() const { return half_precision_; }
+  VkDescriptorType type_of_maps() const {
+    return sampled_ ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER;
+  }
   VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
   VkPipelineLayout layout() const { return layout_.get(); }
   /// Throws Error for iterate_raster.

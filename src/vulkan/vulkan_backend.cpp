@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <limits>
+#include <numeric>
 
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
 
-constexpr VkFormat map_format = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
 /// Texels of fewer bytes take texture units fewer cycles.
 constexpr VkFormat format_of_filtered_texels = VK_FORMAT_R16_SFLOAT;
@@ -40,8 +39,7 @@ bool runs_on_cpu(const VulkanContext& context) {
 
 /// As the block of shaders/bindings.glsl.
 struct PlaceBlock {
-  std::array<std::array<std::int32_t, 4>, MAX_VIEWS> maps{};
-  std::array<std::array<std::int32_t, 4>, MAX_VIEWS> intensities{};
+  std::array<std::array<std::int32_t, 4>, MAX_VIEWS> places{};
 };
 
 cv::Size largest(std::span<const cv::Size> sizes) {
@@ -59,20 +57,6 @@ VkDeviceSize largest_area(const std::vector<cv::Size>& sizes) {
                     static_cast<VkDeviceSize>(size.width) * static_cast<VkDeviceSize>(size.height));
   }
   return area;
-}
-
-VkBufferImageCopy region_of(const Atlas::Place& place, cv::Size size) {
-  VkBufferImageCopy region{};
-  region.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, static_cast<std::uint32_t>(place.layer),
-                             1};
-  region.imageOffset = {place.origin.x, place.origin.y, 0};
-  region.imageExtent = {static_cast<std::uint32_t>(size.width),
-                        static_cast<std::uint32_t>(size.height), 1};
-  return region;
-}
-
-VkImageSubresourceRange layer_range(int first, std::uint32_t count) {
-  return {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, static_cast<std::uint32_t>(first), count};
 }
 
 /// `sampled`: images are read as textures. Filters that the device lacks become exact.
@@ -124,12 +108,12 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
                                           : default_max_samples(context.properties().deviceType)),
       pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
                                 cache.get())),
-      map_atlas_(pack_views(sizes)),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
       sampler_(make_sampler(context)),
       command_pool_(make_command_pool(context)) {
   cache.save();
   make_images(context);
+  make_buffers(context);
   make_descriptor_sets();
   for (auto& submission : submissions_) {
     submission =
@@ -141,22 +125,6 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
 VulkanBackend::~VulkanBackend() = default;
 
 void VulkanBackend::make_images(const VulkanContext& context) {
-  const auto make_map = [&](int kinds, const char* purpose) {
-    return make_image(context, map_format, map_atlas_.size, kinds * map_atlas_.layers,
-                      VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT |
-                          VK_IMAGE_USAGE_TRANSFER_DST_BIT,
-                      purpose);
-  };
-  VkDeviceSize count = 0;
-  for (const cv::Size& size : sizes_) {
-    const cv::Size whole = with_apron(size);
-    const VkDeviceSize first = count + static_cast<VkDeviceSize>(APRON * whole.width + APRON);
-    intensity_places_.push_back({static_cast<int>(first), whole.width});
-    count += static_cast<VkDeviceSize>(whole.width) * static_cast<VkDeviceSize>(whole.height);
-  }
-  intensities_ = make_device_buffer(
-      context, count * sizeof(float),
-      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the images");
   const VkFormat format_of_texels = pipelines_.half_precision() ? format_of_filtered_texels
                                     : pipelines_.sampled()      ? intensity_format
                                                                 : format_of_loaded_texels;
@@ -169,8 +137,29 @@ void VulkanBackend::make_images(const VulkanContext& context) {
         VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
         "the images' texels"));
   }
-  rays_ = make_map(1, "the viewing rays");
-  hypotheses_ = make_map(map_kinds, "the planes, their priors and the consistency maps");
+}
+
+void VulkanBackend::make_buffers(const VulkanContext& context) {
+  VkDeviceSize pixels = APRON;  // rays are read so far before and after a view's
+  VkDeviceSize intensities = 0;
+  for (const cv::Size& size : sizes_) {
+    const cv::Size whole = with_apron(size);
+    places_of_maps_.push_back({static_cast<int>(pixels), size.width});
+    places_of_intensities_.push_back(
+        {static_cast<int>(intensities) + APRON * whole.width + APRON, whole.width});
+    pixels += static_cast<VkDeviceSize>(size.width) * static_cast<VkDeviceSize>(size.height);
+    intensities += static_cast<VkDeviceSize>(whole.width) * static_cast<VkDeviceSize>(whole.height);
+  }
+  intensities_ = make_device_buffer(
+      context, intensities * sizeof(float),
+      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the images");
+  const auto make_map = [&](const char* purpose) {
+    return make_map_buffer(context, pixels + APRON, pipelines_.type_of_maps(), purpose);
+  };
+  rays_ = make_map("the viewing rays");
+  hypotheses_ = make_map("the planes");
+  priors_ = make_map("the planes' priors");
+  checks_ = make_map("the consistency maps");
   constexpr VkBufferUsageFlags uniform =
       VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
   parameters_ =
@@ -185,11 +174,12 @@ void VulkanBackend::make_images(const VulkanContext& context) {
 
 void VulkanBackend::make_descriptor_sets() {
   const auto levels = static_cast<std::uint32_t>(texels_.size());
-  const std::array<VkDescriptorPoolSize, 4> pool_sizes = {{
+  const std::array<VkDescriptorPoolSize, 5> pool_sizes = {{
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * levels},
       {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, levels},
-      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 3 * levels},
+      {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, levels},
       {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 3 * levels},
+      {pipelines_.type_of_maps(), 4 * levels},
   }};
   descriptor_pool_ = make_descriptor_pool(context_, levels, pool_sizes);
   for (const LayeredImage& texels : texels_) {
@@ -202,7 +192,7 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& texels_of
       allocate_set(context_, descriptor_pool_.get(), pipelines_.set_layout());
   std::vector<VkWriteDescriptorSet> writes;
   const auto write = [&](Binding binding, VkDescriptorType type, const VkDescriptorImageInfo* image,
-                         const VkDescriptorBufferInfo* buffer) {
+                         const VkDescriptorBufferInfo* buffer, const VkBufferView* view = nullptr) {
     VkWriteDescriptorSet& one = writes.emplace_back();
     one.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
     one.dstSet = set;
@@ -211,16 +201,13 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& texels_of
     one.descriptorType = type;
     one.pImageInfo = image;
     one.pBufferInfo = buffer;
-  };
-  const auto image_info = [&](const LayeredImage& image, VkSampler sampler) {
-    return VkDescriptorImageInfo{sampler, image.view.get(), VK_IMAGE_LAYOUT_GENERAL};
+    one.pTexelBufferView = view;
   };
   const auto buffer_info = [](const Buffer& buffer) {
     return VkDescriptorBufferInfo{buffer.handle.get(), 0, VK_WHOLE_SIZE};
   };
-  const VkDescriptorImageInfo rays = image_info(rays_, VK_NULL_HANDLE);
-  const VkDescriptorImageInfo hypotheses = image_info(hypotheses_, VK_NULL_HANDLE);
-  const VkDescriptorImageInfo texels = image_info(texels_of_level, sampler_.get());
+  const VkDescriptorImageInfo texels = {sampler_.get(), texels_of_level.view.get(),
+                                        VK_IMAGE_LAYOUT_GENERAL};
   const VkDescriptorBufferInfo intensities = buffer_info(intensities_);
   const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
   const VkDescriptorBufferInfo places = buffer_info(places_);
@@ -229,8 +216,18 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& texels_of
   write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
   write(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &places);
   write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &intensities);
-  write(binding_rays, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &rays, nullptr);
-  write(binding_hypotheses, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &hypotheses, nullptr);
+  const std::array<std::pair<Binding, const MapBuffer*>, 4> maps = {
+      {{binding_rays, &rays_},
+       {binding_hypotheses, &hypotheses_},
+       {binding_priors, &priors_},
+       {binding_checks, &checks_}}};
+  std::array<VkDescriptorBufferInfo, maps.size()> of_maps;
+  std::array<VkBufferView, maps.size()> views_of_maps;
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    of_maps[i] = buffer_info(maps[i].second->buffer);
+    views_of_maps[i] = maps[i].second->view.get();
+    write(maps[i].first, pipelines_.type_of_maps(), nullptr, &of_maps[i], &views_of_maps[i]);
+  }
   write(binding_texel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &texels, nullptr);
   write(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &texels, nullptr);
   write(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &nearest);
@@ -247,7 +244,8 @@ VkDescriptorSet VulkanBackend::descriptor_set(int first_view) const {
 void VulkanBackend::start_memory() {
   const VkCommandBuffer commands = submissions_[0]->begin();
   const auto clear = [&](const LayeredImage& image, const VkClearColorValue& value) {
-    const VkImageSubresourceRange all = layer_range(0, VK_REMAINING_ARRAY_LAYERS);
+    constexpr VkImageSubresourceRange all = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0,
+                                             VK_REMAINING_ARRAY_LAYERS};
     transition(commands, image, all, VK_IMAGE_LAYOUT_UNDEFINED,
                VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
     context_.vk().vkCmdClearColorImage(commands, image.handle.get(),
@@ -260,14 +258,15 @@ void VulkanBackend::start_memory() {
                                 std::bit_cast<std::uint32_t>(MASKED_INTENSITY));
   if (pipelines_.half_precision()) std::fill_n(masked.float32, 4, LOWEST_HALF);
   for (const LayeredImage& texels : texels_) clear(texels, masked);
-  clear(rays_, {});
-  clear(hypotheses_, {});
+  for (const MapBuffer* map : {&rays_, &hypotheses_, &priors_, &checks_}) {
+    context_.vk().vkCmdFillBuffer(commands, map->buffer.handle.get(), 0, VK_WHOLE_SIZE, 0);
+  }
 
   PlaceBlock block;
   for (std::size_t view = 0; view < sizes_.size(); ++view) {
-    const Atlas::Place& place = map_atlas_.places[view];
-    block.maps[view] = {place.origin.x, place.origin.y, place.layer, map_atlas_.layers};
-    block.intensities[view] = {intensity_places_[view].first, intensity_places_[view].stride, 0, 0};
+    const Place& maps = places_of_maps_[view];
+    const Place& intensities = places_of_intensities_[view];
+    block.places[view] = {maps.first, maps.stride, intensities.first, intensities.stride};
   }
   context_.vk().vkCmdUpdateBuffer(commands, places_.handle.get(), 0, sizeof block, &block);
   submissions_[0]->submit();
@@ -292,14 +291,16 @@ void VulkanBackend::transition(VkCommandBuffer commands, const LayeredImage& ima
                                      nullptr, 0, nullptr, 1, &info);
 }
 
-void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags stages,
-                            VkAccessFlags access) const {
+void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags from,
+                            VkPipelineStageFlags to, VkAccessFlags access) const {
   VkMemoryBarrier memory{};
   memory.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER;
-  memory.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_TRANSFER_WRITE_BIT;
+  memory.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+  if ((from & VK_PIPELINE_STAGE_TRANSFER_BIT) != 0) {
+    memory.srcAccessMask |= VK_ACCESS_TRANSFER_WRITE_BIT;
+  }
   memory.dstAccessMask = access;
-  context_.vk().vkCmdPipelineBarrier(commands, compute_and_transfer, stages, 0, 1, &memory, 0,
-                                     nullptr, 0, nullptr);
+  context_.vk().vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
 void VulkanBackend::stage(int view, const cv::Mat& map, int type) {
@@ -308,35 +309,33 @@ void VulkanBackend::stage(int view, const cv::Mat& map, int type) {
   map.copyTo(cv::Mat(size, type, staging_.mapped));
 }
 
-void VulkanBackend::upload(const LayeredImage& image, int view, const cv::Mat& map) {
-  stage(view, map, CV_32FC4);
-  const Atlas::Place& place = map_atlas_.places[static_cast<std::size_t>(view)];
+VkDeviceSize VulkanBackend::first_byte_of_map(int view) const {
+  const int first = places_of_maps_.at(static_cast<std::size_t>(view)).first;
+  return static_cast<VkDeviceSize>(first) * sizeof(cv::Vec4f);
+}
+
+VkDeviceSize VulkanBackend::map_bytes(int view) const {
+  const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
+  return static_cast<VkDeviceSize>(size.area()) * sizeof(cv::Vec4f);
+}
+
+void VulkanBackend::upload(const MapBuffer& map, int view, const cv::Mat& values) {
+  stage(view, values, CV_32FC4);
+  const VkBufferCopy all = {0, first_byte_of_map(view), map_bytes(view)};
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange layer = layer_range(place.layer, 1);
-  const VkBufferImageCopy region = region_of(place, map.size());
-  transition(commands, image, layer, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL);
-  context_.vk().vkCmdCopyBufferToImage(commands, staging_.handle.get(), image.handle.get(),
-                                       VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &region);
-  transition(commands, image, layer, VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
+  context_.vk().vkCmdCopyBuffer(commands, staging_.handle.get(), map.buffer.handle.get(), 1, &all);
   submissions_[0]->submit();
   submissions_[0]->wait();
 }
 
-cv::Mat VulkanBackend::download(MapKind kind, int view) {
+cv::Mat VulkanBackend::download(const MapBuffer& map, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
-  Atlas::Place place = map_atlas_.places[static_cast<std::size_t>(view)];
-  place.layer += kind * map_atlas_.layers;
+  const VkBufferCopy all = {first_byte_of_map(view), 0, map_bytes(view)};
   const VkCommandBuffer commands = submissions_[0]->begin();
-  const VkImageSubresourceRange range = layer_range(place.layer, 1);
-  const VkBufferImageCopy region = region_of(place, size);
-  transition(commands, hypotheses_, range, VK_IMAGE_LAYOUT_GENERAL,
-             VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL);
-  context_.vk().vkCmdCopyImageToBuffer(commands, hypotheses_.handle.get(),
-                                       VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, staging_.handle.get(),
-                                       1, &region);
-  transition(commands, hypotheses_, range, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
-             VK_IMAGE_LAYOUT_GENERAL);
-  barrier(commands, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
+  barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_TRANSFER_BIT,
+          VK_ACCESS_TRANSFER_READ_BIT);
+  context_.vk().vkCmdCopyBuffer(commands, map.buffer.handle.get(), staging_.handle.get(), 1, &all);
+  barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();
   return cv::Mat(size, CV_32FC4, staging_.mapped).clone();
@@ -346,7 +345,7 @@ void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view
 void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
   stage(view, intensity, CV_32FC1);
   const cv::Size size = intensity.size();
-  const IntensityPlace& place = intensity_places_[static_cast<std::size_t>(view)];
+  const Place& place = places_of_intensities_[static_cast<std::size_t>(view)];
   const VkDeviceSize row = static_cast<VkDeviceSize>(size.width) * sizeof(float);
   std::vector<VkBufferCopy> rows;
   for (int y = 0; y < size.height; ++y) {
@@ -363,12 +362,13 @@ void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
 void VulkanBackend::set_hypotheses(int view, const cv::Mat& hypotheses) {
   upload(hypotheses_, view, hypotheses);
 }
-cv::Mat VulkanBackend::hypotheses(int view) { return download(planes, view); }
-cv::Mat VulkanBackend::checks(int view) { return download(checks_of_planes, view); }
+cv::Mat VulkanBackend::hypotheses(int view) { return download(hypotheses_, view); }
+cv::Mat VulkanBackend::checks(int view) { return download(checks_, view); }
 
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;
-  for (const LayeredImage* image : {&rays_, &hypotheses_}) bytes += image->bytes;
+  for (const MapBuffer* map : {&rays_, &hypotheses_, &priors_, &checks_})
+    bytes += map->buffer.bytes;
   for (const LayeredImage& texels : texels_) bytes += texels.bytes;
   for (const Buffer* buffer :
        {&intensities_, &parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
@@ -378,15 +378,18 @@ std::size_t VulkanBackend::device_bytes() const {
 }
 
 void VulkanBackend::record_barrier(VkCommandBuffer commands) const {
-  barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
-          VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT);
+  barrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+          VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
 }
 
 void VulkanBackend::record_parameters(VkCommandBuffer commands, const Schedule& schedule) const {
   require_constants(schedule, constants_);
-  barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT);
+  barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_TRANSFER_BIT,
+          VK_ACCESS_TRANSFER_WRITE_BIT);
   context_.vk().vkCmdUpdateBuffer(commands, parameters_.handle.get(), 0, sizeof schedule.parameters,
                                   &schedule.parameters);
+  barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
+          VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT | VK_ACCESS_UNIFORM_READ_BIT);
 }
 
 void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) const {
@@ -447,7 +450,7 @@ struct VulkanBackend::Run {
       if (work.stretches.empty()) {
         work.stretches.push_back({kernel, 0});
       } else if (work.stretches.back().kernel != kernel) {
-        submission.write_timestamp();
+        if (backend.time_each_) submission.write_timestamp();
         work.stretches.push_back({kernel, 0});
       }
       if (band.first_row == 0) ++work.stretches.back().dispatches;
@@ -467,9 +470,11 @@ struct VulkanBackend::Run {
     const InFlight& work = in_flight[turn];
     const std::vector<double> elapsed = submission.elapsed();
     for (std::size_t i = 0; i < work.stretches.size(); ++i) {
+      const bool timed = backend.time_each_ && i < elapsed.size();
       backend.times_.add(work.stretches[i].kernel, work.stretches[i].dispatches,
-                         i < elapsed.size() ? elapsed[i] : 0);
+                         timed ? elapsed[i] : 0);
     }
+    backend.milliseconds_ += std::accumulate(elapsed.begin(), elapsed.end(), 0.0);
     progress.advance(work.samples);
   }
 
@@ -483,6 +488,7 @@ struct VulkanBackend::Run {
 void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
   require_constants(schedule, constants_);
   times_.clear();
+  milliseconds_ = 0;
   const std::vector<Band> bands = split_into_bands(schedule, max_samples_);
   Run run{*this, schedule, ScheduleProgress(schedule, progress)};
   bool first = true;

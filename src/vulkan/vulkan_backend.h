@@ -9,7 +9,6 @@
 
 #include "matching/backend.h"
 #include "schedule/bands.h"
-#include "vulkan/atlas.h"
 #include "vulkan/memory.h"
 #include "vulkan/pipeline_cache.h"
 #include "vulkan/pipelines.h"
@@ -59,19 +58,20 @@ class VulkanBackend final : public Backend {
   void set_hypotheses(int view, const cv::Mat& hypotheses) override;
   cv::Mat checks(int view) override;
   std::vector<KernelTime> times() const override { return times_.list(); }
+  void time_kernels(bool each) override { time_each_ = each; }
+  double device_milliseconds() const override { return milliseconds_; }
   std::size_t device_bytes() const override;
 
  private:
   struct Run;  // of run(): what is in flight
-  /// What hypotheses_ holds behind each other, by its numbers in shaders/bindings.glsl.
-  enum MapKind : int { planes, priors, checks_of_planes, map_kinds };
-  /// Where a view's intensities lie, which an apron surrounds.
-  struct IntensityPlace {
-    int first = 0;   ///< number of pixel (0, 0) in the buffer
+  /// Where a view lies in a buffer.
+  struct Place {
+    int first = 0;   ///< number of pixel (0, 0)
     int stride = 0;  ///< from row to row
   };
 
   void make_images(const VulkanContext& context);
+  void make_buffers(const VulkanContext& context);
   void make_descriptor_sets();
   VkDescriptorSet make_descriptor_set(const LayeredImage& texels_of_level);
   void start_memory();
@@ -79,24 +79,30 @@ class VulkanBackend final : public Backend {
                   const VkImageSubresourceRange& layers, VkImageLayout from,
                   VkImageLayout to) const;
   void record_band(VkCommandBuffer commands, const Band& band) const;
-  void barrier(VkCommandBuffer commands, VkPipelineStageFlags stages, VkAccessFlags access) const;
+  /// Lets later commands of some stages see what earlier ones of others wrote.
+  void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkPipelineStageFlags to,
+               VkAccessFlags access) const;
   /// Puts a map for a view into the staging buffer.
   void stage(int view, const cv::Mat& map, int type);
-  void upload(const LayeredImage& image, int view, const cv::Mat& map);
-  cv::Mat download(MapKind kind, int view);
+  void upload(const MapBuffer& map, int view, const cv::Mat& values);
+  cv::Mat download(const MapBuffer& map, int view);
+  VkDeviceSize first_byte_of_map(int view) const;
+  VkDeviceSize map_bytes(int view) const;
   int views_of_level() const { return constants_.source_count + 1; }
 
   const VulkanContext& context_;
   std::vector<cv::Size> sizes_;
-  std::vector<IntensityPlace> intensity_places_;
+  std::vector<Place> places_of_maps_;
+  std::vector<Place> places_of_intensities_;  // which an apron surrounds
   KernelConstants constants_;
   long long max_samples_;
   Pipelines pipelines_;
-  Atlas map_atlas_;
   Buffer intensities_;
-  LayeredImage rays_;
+  MapBuffer rays_;
+  MapBuffer hypotheses_;
+  MapBuffer priors_;
+  MapBuffer checks_;
   std::vector<LayeredImage> texels_;  // of each level
-  LayeredImage hypotheses_;           // of each MapKind
   Buffer parameters_;
   Buffer places_;
   Buffer transfer_nearest_;
@@ -108,6 +114,8 @@ class VulkanBackend final : public Backend {
   Handle<VkCommandPool> command_pool_;
   std::array<std::unique_ptr<Submission>, 2> submissions_;  // one is recorded while the other runs
   KernelTimes times_;
+  bool time_each_ = true;
+  double milliseconds_ = 0;  // of the last run
 };
 
 }  // namespace widestereo

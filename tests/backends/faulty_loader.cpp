@@ -76,6 +76,13 @@ VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceP
   if (faults().largest_push_constants > 0) {
     out->limits.maxPushConstantsSize = faults().largest_push_constants;
   }
+  if (faults().largest_buffer > 0) {
+    out->limits.maxStorageBufferRange = faults().largest_buffer;
+    out->limits.maxTexelBufferElements = faults().largest_buffer / 16;
+  }
+  if (faults().storage_buffers > 0) {
+    out->limits.maxPerStageDescriptorStorageBuffers = faults().storage_buffers;
+  }
 }
 
 VKAPI_ATTR void VKAPI_CALL properties_since_1_1(VkPhysicalDevice, VkPhysicalDeviceProperties2*) {

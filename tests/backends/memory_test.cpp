@@ -38,11 +38,11 @@ double documented_bytes(const DeviceInfo& device, int levels, int texels_per_pix
     return wide * rounded_up(wide * texel, cuda ? 128 : 1);
   };
   // Vulkan stages transfers of one map in a buffer.
-  const bool levels_share_layers = device.kind == DeviceKind::vulkan;
-  double bytes = side * side * (bytes_of_transfer + (levels_share_layers ? 16 : 0));
+  const bool vulkan = device.kind == DeviceKind::vulkan;
+  double bytes = side * side * (bytes_of_transfer + (vulkan ? 16 : 0));
   // Software Vulkan keeps each texel with its right, lower and lower right neighbour; texture
   // units filter half precision.
-  const bool loads = levels_share_layers && device.type == "cpu";
+  const bool loads = vulkan && device.type == "cpu";
   const double bytes_of_texel = loads                            ? 4 * bytes_of_intensity
                                 : device.kind == DeviceKind::cpu ? bytes_of_intensity
                                                                  : 2;
@@ -50,16 +50,9 @@ double documented_bytes(const DeviceInfo& device, int levels, int texels_per_pix
     const double own = side / (1 << level);
     const double texels = texels_per_pixel * (own + 2 * 16);
     bytes += 2 * bytes_of_rows(own + 2 * 16, bytes_of_intensity);
-    if (levels_share_layers) {
-      bytes += 2 * bytes_of_image(texels, texels, bytes_of_texel, bytes_of_tile);
-    } else {
-      bytes += 2 * bytes_of_rows(texels, bytes_of_texel);
-      bytes += 2 * own * own * maps * bytes_of_map;
-    }
-  }
-  if (levels_share_layers) {
-    const double layers = levels == 1 ? 2 : 3;  // one for all that is coarse
-    bytes += layers * maps * bytes_of_image(side, side, bytes_of_map, bytes_of_tile);
+    bytes += 2 * (vulkan ? bytes_of_image(texels, texels, bytes_of_texel, bytes_of_tile)
+                         : bytes_of_rows(texels, bytes_of_texel));
+    bytes += 2 * own * own * maps * bytes_of_map;
   }
   return bytes;
 }

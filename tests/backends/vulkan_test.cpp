@@ -101,6 +101,25 @@ TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
   EXPECT_THAT(device->validation_messages(), IsEmpty());
 }
 
+TEST(VulkanMatch, KernelsNeedNotBeTimed) {
+  REQUIRE_VULKAN_OR_SKIP();
+  KernelFixture match = small_match();
+  const auto device = open_vulkan_device(0, validated());
+  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const cv::Mat timed = run(*backend, match);
+  const std::vector<KernelTime> times = backend->times();
+  double sum = 0;
+  for (const KernelTime& time : times) sum += time.milliseconds;
+  EXPECT_GT(sum, 0);
+  EXPECT_NEAR(backend->device_milliseconds(), sum, 1e-9 * sum);
+  backend->time_kernels(false);
+  EXPECT_TRUE(same_bits(timed, run(*backend, match)));
+  EXPECT_GT(backend->device_milliseconds(), 0);
+  ASSERT_EQ(backend->times().size(), times.size());
+  for (const KernelTime& time : backend->times()) EXPECT_EQ(time.milliseconds, 0) << time.kernel;
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
 TEST(VulkanMatch, BitsDependNeitherOnSplittingNorOnTheRun) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
@@ -465,6 +484,14 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   EXPECT_THAT(message_of_match(), HasSubstr("largest image width is 40"));
   FaultyLoader::faults() = {.largest_resource = 1000};
   EXPECT_THAT(message_of_match(), HasSubstr("its maxResourceSize is 1 MiB"));
+  FaultyLoader::faults() = {.largest_buffer = 50000};
+  EXPECT_THAT(message_of_match(),
+              HasSubstr("the viewing rays of 1 MiB: its maxTexelBufferElements"));
+  FaultyLoader::faults() = {.type = type_of_gpu, .largest_buffer = 50000};
+  EXPECT_THAT(message_of_match(),
+              HasSubstr("the viewing rays of 1 MiB: its maxStorageBufferRange"));
+  FaultyLoader::faults() = {.type = type_of_gpu, .storage_buffers = 4};
+  EXPECT_THAT(message_of_match(), HasSubstr("maxPerStageDescriptorStorageBuffers is 4, but 8"));
   FaultyLoader::faults() = {.largest_push_constants = 16};
   EXPECT_THAT(message_of_match(), HasSubstr("maxPushConstantsSize is 16, but 68"));
 }

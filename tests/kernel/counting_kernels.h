@@ -97,6 +97,15 @@ inline Context context_of(KernelFixture& fixture) {
 inline vec4 ray_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return numbers<vec4>(kernel::cpu::ray_at(context.plain, view, p));
 }
+struct RayRow {
+  kernel::cpu::RayRow plain;
+};
+inline RayRow ray_row(CONTEXT_ARGUMENT int view, ivec2 p) {
+  return {kernel::cpu::ray_row(context.plain, view, p)};
+}
+inline vec4 ray_in_row(const RayRow& row, int dx) {
+  return numbers<vec4>(kernel::cpu::ray_in_row(row.plain, dx));
+}
 inline Number intensity_at(CONTEXT_ARGUMENT int view, ivec2 p) {
   return kernel::cpu::intensity_at(context.plain, view, p);
 }

@@ -47,10 +47,11 @@ TEST(Work, OfPositionsInTexelsIsNothingWhereTheseArePixels) {
     const PatchOperations of_half_pixels = patch_operations(constants);
     constants.texels_per_pixel = 1;
     const PatchOperations of_pixels = patch_operations(constants);
-    // Positions of two numbers: the centre's, and each sample's or those of the map.
-    EXPECT_EQ(of_half_pixels.of_sample - of_pixels.of_sample, warp == PatchWarp::exact ? 2 : 0);
+    // Positions of two numbers: the centre's, and those of the map. Where each sample is projected,
+    // the camera has its scale: the principal point, and focal lengths and skew.
+    EXPECT_EQ(of_half_pixels.of_sample - of_pixels.of_sample, 0);
     EXPECT_EQ(of_half_pixels.of_patch - of_pixels.of_patch,
-              warp == PatchWarp::exact ? 2 : (warp == PatchWarp::affine ? 8 : 14));
+              warp == PatchWarp::exact ? 7 : (warp == PatchWarp::affine ? 8 : 14));
   }
 }
 
