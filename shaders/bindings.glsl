@@ -9,8 +9,7 @@
 // maps as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels of half
 // precision (HALF_PRECISION).
 
-// Multiples of 8 in x keep the lanes of lavapipe busy; 64 invocations are legal everywhere.
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x_id = 8, local_size_y_id = 9) in;
 
 layout(constant_id = 0) const int WINDOW_RADIUS = 5;
 layout(constant_id = 1) const int WARP = 0;
@@ -22,9 +21,11 @@ layout(constant_id = 5) const int WEIGHTED = 0;
 layout(constant_id = 7) const int TEXELS_PER_PIXEL = 1;
 #ifdef TEXEL_LOADS
 #define FILTER FILTER_EXACT
+#define ROWS_AT_ONCE 1
 #else
 layout(constant_id = 6) const int FILTER = 0;
 #define HAS_DEVICE_FILTER
+#define ROWS_AT_ONCE (PATTERN == PATTERN_CHECKERBOARD ? 2 : 1)
 #endif
 
 layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parameters; };

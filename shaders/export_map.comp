@@ -2,6 +2,7 @@
 // A map of a view into an application's buffer, as the host makes it.
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
 #include "portable.h"
 

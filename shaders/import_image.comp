@@ -2,6 +2,7 @@
 // A view's intensities from an image in an application's buffer, as the host makes them.
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
 #include "portable.h"
 

@@ -2,6 +2,7 @@
 // A view's intensities from an application's texture.
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_samplerless_texture_functions : require
 
 #include "portable.h"

@@ -2,6 +2,7 @@
 // The Vulkan entry point of a kernel of kernel_list.h: KERNEL is its function, VIEW the view over which it runs.
 #version 450
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 
 #include "portable.h"
 

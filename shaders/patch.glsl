@@ -328,38 +328,43 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_aa = 0.0f;
   float sum_bb = 0.0f;
   float sum_ab = 0.0f;
-  UNROLL_ROWS for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-    int first = first_column(CONTEXT WINDOW_RADIUS, dy);
-    ivec2 begin = ivec2(pixel.x + first, pixel.y + dy);
-    IntensityRow intensities_of_row = intensity_row(CONTEXT reference, begin);
-    // The image ends where its intensities are masked.
-    RayRow rays_of_row = ray_row(CONTEXT reference, ivec2(begin.x, clamp(begin.y, 0, last_row)));
-    RowMap row;
-    if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
-    UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
-      float a = intensity_in_row(intensities_of_row, dx);
-      vec2 texel;
-      bool seen = true;
-      if (WARP == WARP_EXACT) {
-        vec4 ray = ray_in_row(rays_of_row, dx);
-        seen = warp_ray(start.warp, camera_of_samples, model, vec3(ray.x, ray.y, ray.z), texel);
-      } else {
-        texel = map_offset(CONTEXT row, float(dx));
+  for (int top = -WINDOW_RADIUS; top <= WINDOW_RADIUS; top += ROWS_AT_ONCE) {
+    UNROLL for (int turn = 0; turn < ROWS_AT_ONCE; ++turn) {
+      int dy = top + turn;
+      if (ROWS_AT_ONCE > 1 && dy > WINDOW_RADIUS) break;
+      // Columns are constants then.
+      int first = ROWS_AT_ONCE > 1 ? turn - WINDOW_RADIUS : first_column(CONTEXT WINDOW_RADIUS, dy);
+      ivec2 begin = ivec2(pixel.x + first, pixel.y + dy);
+      IntensityRow intensities_of_row = intensity_row(CONTEXT reference, begin);
+      // The image ends where its intensities are masked.
+      RayRow rays_of_row = ray_row(CONTEXT reference, ivec2(begin.x, clamp(begin.y, 0, last_row)));
+      RowMap row;
+      if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
+      UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
+        float a = intensity_in_row(intensities_of_row, dx);
+        vec2 texel;
+        bool seen = true;
+        if (WARP == WARP_EXACT) {
+          vec4 ray = ray_in_row(rays_of_row, dx);
+          seen = warp_ray(start.warp, camera_of_samples, model, vec3(ray.x, ray.y, ray.z), texel);
+        } else {
+          texel = map_offset(CONTEXT row, float(dx));
+        }
+        float b = sample_image(CONTEXT source, camera.size, texel);
+        seen = seen && min(a, b) >= 0.0f;
+        a -= start.centre_a;
+        b -= start.centre_b;
+        float weight = sample_weight(CONTEXT a, inverse_scale);
+        float weighted_a = weight * a;
+        float weighted_b = weight * b;
+        ADD_WHERE(seen, samples, 1.0f);
+        if (WEIGHTED != 0) ADD_WHERE(seen, n, weight);
+        ADD_WHERE(seen, sum_a, weighted_a);
+        ADD_WHERE(seen, sum_b, weighted_b);
+        ADD_WHERE(seen, sum_aa, weighted_a * a);
+        ADD_WHERE(seen, sum_bb, weighted_b * b);
+        ADD_WHERE(seen, sum_ab, weighted_a * b);
       }
-      float b = sample_image(CONTEXT source, camera.size, texel);
-      seen = seen && min(a, b) >= 0.0f;
-      a -= start.centre_a;
-      b -= start.centre_b;
-      float weight = sample_weight(CONTEXT a, inverse_scale);
-      float weighted_a = weight * a;
-      float weighted_b = weight * b;
-      ADD_WHERE(seen, samples, 1.0f);
-      if (WEIGHTED != 0) ADD_WHERE(seen, n, weight);
-      ADD_WHERE(seen, sum_a, weighted_a);
-      ADD_WHERE(seen, sum_b, weighted_b);
-      ADD_WHERE(seen, sum_aa, weighted_a * a);
-      ADD_WHERE(seen, sum_bb, weighted_b * b);
-      ADD_WHERE(seen, sum_ab, weighted_a * b);
     }
   }
   if (WEIGHTED == 0) n = samples;

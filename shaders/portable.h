@@ -22,6 +22,8 @@
 //   vec4  prior_at, check_at and the like, and the blocks PARAMETERS and PASS of parameters.glsl;
 //   TEXELS_PER_PIXEL                        each way, of the images that sources are sampled from: 1, or 2 where
 //                                           interpolate_pixel() makes half pixels
+//   ROWS_AT_ONCE                            of a patch: 1, or 2 where the pattern is a checkerboard, whose rows start in turn
+//                                           one column later, and a compiler unrolls them
 //   SOURCE_COUNT                            of a view, and ONE_SOURCE, whether a compiler knows it to be 1
 //   VIEW_OF_LAUNCH                          which of the views that one launch runs over this thread has, from 0.
 #ifndef WIDESTEREO_PORTABLE_H
@@ -32,11 +34,9 @@
 #ifdef __CUDACC__
 #define FN __host__ __device__ inline
 #define UNROLL _Pragma("unroll")
-#define UNROLL_ROWS _Pragma("unroll C::unrolled_rows")
 #else
 #define FN inline
 #define UNROLL
-#define UNROLL_ROWS
 #endif
 #define OUT(T) T&
 #define INOUT(T) T&
@@ -56,8 +56,11 @@
 #else
 
 #define FN
+#ifdef TEXEL_LOADS
 #define UNROLL
-#define UNROLL_ROWS
+#else
+#define UNROLL [[unroll]]
+#endif
 #define OUT(T) out T
 #define INOUT(T) inout T
 #define CONTEXT

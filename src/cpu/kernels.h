@@ -48,6 +48,7 @@ struct Context {
 #define PATTERN context.constants.pattern
 #define WEIGHTED context.constants.weighted
 #define FILTER FILTER_EXACT
+#define ROWS_AT_ONCE 1
 #define TEXELS_PER_PIXEL context.constants.texels_per_pixel
 
 inline vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }

@@ -27,9 +27,6 @@ struct Constants {
   static constexpr int texels_per_pixel = TexelsPerPixel;
   static constexpr int camera_model = Model;
   static constexpr int source_count = Sources;
-  /// On the checkerboard rows start in turn one column later: two are the same for all turns.
-  static constexpr int unrolled_rows =
-      Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
 };
 using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 
@@ -44,6 +41,7 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 #define ONE_SOURCE (C::source_count == 1)
 #define VIEW_OF_LAUNCH static_cast<int>(blockIdx.z)
 #define HAS_DEVICE_FILTER
+#define ROWS_AT_ONCE (C::pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1)
 #undef PARAMETERS
 #define PARAMETERS (*context.parameters)
 #undef FN

@@ -147,7 +147,9 @@ void Conversions::record(VkCommandBuffer commands, const BoundConversions::One& 
                              static_cast<std::uint32_t>(sets.size()), sets.data(), 0, nullptr);
   vk.vkCmdPushConstants(commands, way.layout.get(), VK_SHADER_STAGE_COMPUTE_BIT, 0,
                         sizeof constants, &constants);
-  vk.vkCmdDispatch(commands, workgroups(size.width), workgroups(size.height), 1);
+  const Pipelines& pipelines = backend_.pipelines();
+  vk.vkCmdDispatch(commands, pipelines.workgroups_of_row(size.width),
+                   pipelines.workgroups_of_column(size.height), 1);
 }
 
 }  // namespace widestereo

@@ -21,11 +21,17 @@ Handle<VkShaderModule> make_module(const VulkanContext& context, const std::stri
   return context.own(module, context.vk().vkDestroyShaderModule);
 }
 
+std::uint32_t count_of(int pixels, std::uint32_t side) {
+  return (static_cast<std::uint32_t>(pixels) + side - 1) / side;
+}
+
 }  // namespace
 
-std::uint32_t workgroups(int pixels) {
-  constexpr int side = 8;  // of shaders/bindings.glsl
-  return static_cast<std::uint32_t>((pixels + side - 1) / side);
+std::uint32_t Pipelines::workgroups_of_row(int pixels) const {
+  return count_of(pixels, constants_.width);
+}
+std::uint32_t Pipelines::workgroups_of_column(int pixels) const {
+  return count_of(pixels, constants_.height);
 }
 
 Handle<VkDescriptorSetLayout> make_set_layout(
@@ -84,7 +90,7 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
                      VkPipelineCache cache)
-    : constants_(constants),
+    : constants_{constants, sampled ? 16u : 8u, 8},
       sampled_(sampled),
       half_precision_(constants.filter == static_cast<int>(Filter::device) &&
                       context.filters_half_precision()) {
@@ -122,15 +128,17 @@ void Pipelines::make_layouts(const VulkanContext& context) {
 
 Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::string& name,
                                    VkPipelineLayout layout, VkPipelineCache cache) const {
-  static constexpr std::array<VkSpecializationMapEntry, 8> entries = {{
-      {0, offsetof(KernelConstants, window_radius), sizeof(int)},
-      {1, offsetof(KernelConstants, warp), sizeof(int)},
-      {2, offsetof(KernelConstants, camera_model), sizeof(int)},
-      {3, offsetof(KernelConstants, source_count), sizeof(int)},
-      {4, offsetof(KernelConstants, pattern), sizeof(int)},
-      {5, offsetof(KernelConstants, weighted), sizeof(int)},
-      {6, offsetof(KernelConstants, filter), sizeof(int)},
-      {7, offsetof(KernelConstants, texels_per_pixel), sizeof(int)},
+  static constexpr std::array<VkSpecializationMapEntry, 10> entries = {{
+      {0, offsetof(Constants, kernel.window_radius), sizeof(int)},
+      {1, offsetof(Constants, kernel.warp), sizeof(int)},
+      {2, offsetof(Constants, kernel.camera_model), sizeof(int)},
+      {3, offsetof(Constants, kernel.source_count), sizeof(int)},
+      {4, offsetof(Constants, kernel.pattern), sizeof(int)},
+      {5, offsetof(Constants, kernel.weighted), sizeof(int)},
+      {6, offsetof(Constants, kernel.filter), sizeof(int)},
+      {7, offsetof(Constants, kernel.texels_per_pixel), sizeof(int)},
+      {8, offsetof(Constants, width), sizeof(std::uint32_t)},
+      {9, offsetof(Constants, height), sizeof(std::uint32_t)},
   }};
   const Handle<VkShaderModule> module = make_module(context, sampled_ ? name : name + "_loads");
   const VkSpecializationInfo specialisation = {static_cast<std::uint32_t>(entries.size()),

@@ -25,9 +25,6 @@ enum Binding : std::uint32_t {
   binding_winner = 10,
 };
 
-/// How many cover so many pixels of a row or a column.
-std::uint32_t workgroups(int pixels);
-
 // All throw Error naming the device and what failed.
 Handle<VkDescriptorSetLayout> make_set_layout(
     const VulkanContext& context, std::span<const VkDescriptorSetLayoutBinding> bindings);
@@ -52,6 +49,9 @@ class Pipelines {
             VkPipelineCache cache);
 
   bool sampled() const { return sampled_; }
+  /// How many workgroups cover so many pixels of a row, or of a column.
+  std::uint32_t workgroups_of_row(int pixels) const;
+  std::uint32_t workgroups_of_column(int pixels) const;
   bool half_precision() const { return half_precision_; }
   VkDescriptorType type_of_maps() const {
     return sampled_ ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER : VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER;
@@ -67,7 +67,14 @@ class Pipelines {
  private:
   void make_layouts(const VulkanContext& context);
 
-  KernelConstants constants_;
+  /// What shaders are specialised for, by their numbers in shaders/bindings.glsl.
+  struct Constants {
+    KernelConstants kernel;
+    std::uint32_t width = 0;  ///< of a workgroup, in pixels
+    std::uint32_t height = 0;
+  };
+
+  Constants constants_;
   bool sampled_;
   bool half_precision_;
   Handle<VkDescriptorSetLayout> set_layout_;

@@ -409,7 +409,8 @@ void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) cons
                         &pass);
   const int width = band.dispatch->width;
   const int columns = pass.colour < 0 ? width : (width + 1) / 2;
-  vk.vkCmdDispatch(commands, workgroups(columns), workgroups(band.last_row - band.first_row),
+  vk.vkCmdDispatch(commands, pipelines_.workgroups_of_row(columns),
+                   pipelines_.workgroups_of_column(band.last_row - band.first_row),
                    static_cast<std::uint32_t>(band.dispatch->views));
 }
 
