@@ -9,6 +9,8 @@
 // maps as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels of half
 // precision (HALF_PRECISION).
 
+// Multiples of 8 in x keep the lanes of lavapipe busy, and let the threads that a GPU runs at once share a tile
+// (draw4_of_tile()); 128 invocations are legal everywhere.
 layout(local_size_x_id = 8, local_size_y_id = 9) in;
 
 layout(constant_id = 0) const int WINDOW_RADIUS = 5;

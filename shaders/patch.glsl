@@ -328,7 +328,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   float sum_aa = 0.0f;
   float sum_bb = 0.0f;
   float sum_ab = 0.0f;
-  for (int top = -WINDOW_RADIUS; top <= WINDOW_RADIUS; top += ROWS_AT_ONCE) {
+  UNROLL_ROWS for (int top = -WINDOW_RADIUS; top <= WINDOW_RADIUS; top += ROWS_AT_ONCE) {
     UNROLL for (int turn = 0; turn < ROWS_AT_ONCE; ++turn) {
       int dy = top + turn;
       if (ROWS_AT_ONCE > 1 && dy > WINDOW_RADIUS) break;

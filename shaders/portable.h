@@ -23,7 +23,7 @@
 //   TEXELS_PER_PIXEL                        each way, of the images that sources are sampled from: 1, or 2 where
 //                                           interpolate_pixel() makes half pixels
 //   ROWS_AT_ONCE                            of a patch: 1, or 2 where the pattern is a checkerboard, whose rows start in turn
-//                                           one column later, and a compiler unrolls them
+//                                           one column later, and a compiler is not asked to unroll so many (UNROLL_ROWS)
 //   SOURCE_COUNT                            of a view, and ONE_SOURCE, whether a compiler knows it to be 1
 //   VIEW_OF_LAUNCH                          which of the views that one launch runs over this thread has, from 0.
 #ifndef WIDESTEREO_PORTABLE_H
@@ -34,9 +34,11 @@
 #ifdef __CUDACC__
 #define FN __host__ __device__ inline
 #define UNROLL _Pragma("unroll")
+#define UNROLL_ROWS _Pragma("unroll C::unrolled_rows")
 #else
 #define FN inline
 #define UNROLL
+#define UNROLL_ROWS
 #endif
 #define OUT(T) T&
 #define INOUT(T) T&
@@ -56,6 +58,7 @@
 #else
 
 #define FN
+#define UNROLL_ROWS
 #ifdef TEXEL_LOADS
 #define UNROLL
 #else

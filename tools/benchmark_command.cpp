@@ -40,9 +40,9 @@ void print_header(int runs) {
   std::printf(
       "Per depth map, on the demo scene: wall time (median [min max] of %d runs after one to warm "
       "up, transfers\n"
-      "included) and device time in ms (kernels one by one below it, as shares of their sum; CUDA "
-      "overlaps those of\n"
-      "different views otherwise); work counted at full windows: samples of patches a pixel, "
+      "included) and device time in ms (kernels one by one below it, as shares of their sum; GPUs "
+      "need not finish\n"
+      "each before the next otherwise); work counted at full windows: samples of patches a pixel, "
       "million samples,\n"
       "10^9 FP32 operations of patches and regressions, 10^9 source texels and 10^9 bytes of\n"
       "maps a second of device time.\n"

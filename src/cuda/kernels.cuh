@@ -27,6 +27,9 @@ struct Constants {
   static constexpr int texels_per_pixel = TexelsPerPixel;
   static constexpr int camera_model = Model;
   static constexpr int source_count = Sources;
+  /// On the checkerboard rows start in turn one column later: two are the same for all turns.
+  static constexpr int unrolled_rows =
+      Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
 };
 using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 
@@ -41,7 +44,7 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 #define ONE_SOURCE (C::source_count == 1)
 #define VIEW_OF_LAUNCH static_cast<int>(blockIdx.z)
 #define HAS_DEVICE_FILTER
-#define ROWS_AT_ONCE (C::pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1)
+#define ROWS_AT_ONCE 1
 #undef PARAMETERS
 #define PARAMETERS (*context.parameters)
 #undef FN
@@ -180,16 +183,31 @@ struct Algorithm {
 
 #include "algorithm.glsl"
 
+  /// This thread's place in its block, where consecutive threads fill tiles of such a size.
+  template <unsigned width, unsigned height>
+  FN uint2 place_in_tiles() {
+    const unsigned thread = threadIdx.y * block_width + threadIdx.x;
+    const unsigned tile = thread / (width * height);
+    constexpr unsigned tiles_of_row = block_width / width;
+    return make_uint2(width * (tile % tiles_of_row) + thread % width,
+                      height * (tile / tiles_of_row) + thread / width % height);
+  }
+
   /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
+  /// `warps_in_tiles`: those of draw4_of_tile().
+  template <bool warps_in_tiles>
   FN bool thread_pixel(CONTEXT_ARGUMENT int view, ivec2& pixel) {
     unsigned x = threadIdx.x;
     unsigned y = threadIdx.y;
-    if constexpr (reads_pairs) {
+    if constexpr (warps_in_tiles) {
+      const uint2 place = place_in_tiles<TILE_WIDTH, TILE_HEIGHT>();
+      x = place.x;
+      y = place.y;
+    } else if constexpr (reads_pairs) {
       // Texture units take four threads at a time, whose samples lie closer in squares.
-      const unsigned thread = y * block_width + x;
-      const unsigned square = thread / 4;
-      x = 2 * (square % (block_width / 2)) + thread % 2;
-      y = 2 * (square / (block_width / 2)) + thread / 2 % 2;
+      const uint2 place = place_in_tiles<2, 2>();
+      x = place.x;
+      y = place.y;
     }
     pixel = ivec2(static_cast<int>(blockIdx.x * block_width + x),
                   static_cast<int>(blockIdx.y * block_height + y) + PASS.first_row);
@@ -209,12 +227,18 @@ constexpr int least_blocks(std::string_view kernel) {
   return C::warp == WARP_AFFINE ? 8 : 5;
 }
 
+/// Whether the pixels of a tile look around from the same places, as the threads of a warp then do.
+constexpr bool looks_around_by_tiles(std::string_view kernel) {
+  return kernel == "regress" || kernel == "vote_normal";
+}
+
 #define KERNEL(name, view)                                                             \
+  constexpr bool name##_in_tiles = looks_around_by_tiles(#name);                       \
   template <class C>                                                                   \
   __global__ void __launch_bounds__(block_width* block_height, least_blocks<C>(#name)) \
       name(const __grid_constant__ Context context) {                                  \
     ivec2 pixel;                                                                       \
-    if (Algorithm<C>::thread_pixel(context, view, pixel)) {                            \
+    if (Algorithm<C>::template thread_pixel<name##_in_tiles>(context, view, pixel)) {  \
       Algorithm<C>::name##_pixel(context, pixel);                                      \
     }                                                                                  \
   }

@@ -153,8 +153,8 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
     return too_low("maxUniformBufferRange", sizeof(kernel::MatchParameters),
                    limits.maxUniformBufferRange);
   }
-  if (limits.maxComputeWorkGroupInvocations < 64) {
-    return too_low("maxComputeWorkGroupInvocations", 64, limits.maxComputeWorkGroupInvocations);
+  if (limits.maxComputeWorkGroupInvocations < 128) {
+    return too_low("maxComputeWorkGroupInvocations", 128, limits.maxComputeWorkGroupInvocations);
   }
   // With those of conversions; software devices bind maps as storage images.
   const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;

@@ -90,7 +90,7 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
                      VkPipelineCache cache)
-    : constants_{constants, sampled ? 16u : 8u, 8},
+    : constants_{constants, 8, sampled ? 16u : 8u},
       sampled_(sampled),
       half_precision_(constants.filter == static_cast<int>(Filter::device) &&
                       context.filters_half_precision()) {
