@@ -184,33 +184,28 @@ struct Algorithm {
 #include "algorithm.glsl"
 
   /// This thread's place in its block, where consecutive threads fill tiles of such a size.
-  template <unsigned width, unsigned height>
-  FN uint2 place_in_tiles() {
-    const unsigned thread = threadIdx.y * block_width + threadIdx.x;
-    const unsigned tile = thread / (width * height);
-    constexpr unsigned tiles_of_row = block_width / width;
-    return make_uint2(width * (tile % tiles_of_row) + thread % width,
-                      height * (tile / tiles_of_row) + thread / width % height);
+  template <int width, int height>
+  FN ivec2 place_in_tiles() {
+    const int thread = static_cast<int>(threadIdx.y * block_width + threadIdx.x);
+    const int tile = thread / (width * height);
+    constexpr int tiles_of_row = block_width / width;
+    return ivec2(width * (tile % tiles_of_row) + thread % width,
+                 height * (tile / tiles_of_row) + thread / width % height);
   }
 
   /// This thread's pixel; false outside the dispatch. With a colour, half the columns are launched.
   /// `warps_in_tiles`: those of draw4_of_tile().
   template <bool warps_in_tiles>
   FN bool thread_pixel(CONTEXT_ARGUMENT int view, ivec2& pixel) {
-    unsigned x = threadIdx.x;
-    unsigned y = threadIdx.y;
+    ivec2 place(static_cast<int>(threadIdx.x), static_cast<int>(threadIdx.y));
     if constexpr (warps_in_tiles) {
-      const uint2 place = place_in_tiles<TILE_WIDTH, TILE_HEIGHT>();
-      x = place.x;
-      y = place.y;
+      place = place_in_tiles<TILE_WIDTH, TILE_HEIGHT>();
     } else if constexpr (reads_pairs) {
       // Texture units take four threads at a time, whose samples lie closer in squares.
-      const uint2 place = place_in_tiles<2, 2>();
-      x = place.x;
-      y = place.y;
+      place = place_in_tiles<2, 2>();
     }
-    pixel = ivec2(static_cast<int>(blockIdx.x * block_width + x),
-                  static_cast<int>(blockIdx.y * block_height + y) + PASS.first_row);
+    pixel = ivec2(static_cast<int>(blockIdx.x * block_width) + place.x,
+                  static_cast<int>(blockIdx.y * block_height) + place.y + PASS.first_row);
     if (PASS.colour >= 0) pixel.x = 2 * pixel.x + ((pixel.y + PASS.colour) & 1);
     const ivec4 size = PARAMETERS.cameras[view].size;
     return pixel.x < size.x && pixel.y < min(PASS.last_row, size.y);
