@@ -100,19 +100,20 @@ FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
                distorted.y + q * (camera.prism.z + q * camera.prism.w));
 }
 
-// Projects a direction of any positive length. `model` repeats camera.size.z so that a caller can pass a
-// compile-time constant. Returns false outside the model's domain or the field of view.
-FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
-  real rho2 = point.x * point.x + point.y * point.y;
-  real d = sqrt(rho2 + point.z * point.z);
-  bool inside = point.z > camera.domain.x * d;  // false of the zero vector
+// The squared distance from the optical axis.
+FN real squared_radius(real3 point) { return point.x * point.x + point.y * point.y; }
+
+// Projects a direction at this squared distance from the axis, d its length. `model` repeats camera.size.z so that a
+// caller can pass a compile-time constant. Returns false outside the model's domain, wherever the field of view ends.
+FN bool project_in_domain(CameraParameters camera, int model, real3 point, real rho2, real d, OUT(real2) pixel) {
+  bool inside = true;
   real x = real(0);
   real y = real(0);
   if (is_fisheye(model)) {
     real rho = sqrt(rho2);
     real theta = arc_tangent(rho, point.z);
     real distorted = fisheye_radius(camera, model, theta);
-    inside = inside && theta < camera.domain.y;
+    inside = theta < camera.domain.y;
     bool off_axis = rho > real(0);
     real scale = (off_axis ? distorted : real(1)) * (real(1) / (off_axis ? rho : point.z));
     x = point.x * scale;
@@ -120,13 +121,13 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
   } else if (model == CAMERA_FIELD_OF_VIEW) {
     real rho = sqrt(rho2);
     real distorted = arc_tangent(rho * camera.shape.y, point.z) / camera.shape.x;
-    inside = inside && (rho > real(0) || point.z > real(0));
+    inside = rho > real(0) || point.z > real(0);
     real scale = rho > real(0) ? distorted / rho : camera.shape.y / (camera.shape.x * point.z);
     x = point.x * scale;
     y = point.y * scale;
   } else if (model == CAMERA_EQUIRECTANGULAR) {
     // The last meridian, on both edges of the image, and the poles have no pixel.
-    inside = inside && (point.x * point.x > real(0) || point.z > real(0));
+    inside = point.x * point.x > real(0) || point.z > real(0);
     x = arc_tangent(point.x, point.z);
     y = arc_tangent(point.y, sqrt(point.x * point.x + point.z * point.z));
   } else {
@@ -134,14 +135,14 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
     if (model == CAMERA_DOUBLE_SPHERE) {
       real k = camera.shape.x * d + point.z;
       real d2 = sqrt(rho2 + k * k);
-      inside = inside && k > -camera.shape.z * d2;
+      inside = k > -camera.shape.z * d2;
       denominator = camera.shape.y * d2 + (real(1) - camera.shape.y) * k;
     } else if (model == CAMERA_UNIFIED || model == CAMERA_MEI) {
-      inside = inside && point.z > -camera.shape.y * d;
+      inside = point.z > -camera.shape.y * d;
       denominator = point.z + camera.shape.x * d;
     } else if (model == CAMERA_EXTENDED_UNIFIED) {
       real e = sqrt(camera.shape.y * rho2 + point.z * point.z);
-      inside = inside && point.z > -camera.shape.z * e;
+      inside = point.z > -camera.shape.z * e;
       denominator = camera.shape.x * e + (real(1) - camera.shape.x) * point.z;
     }
     inside = inside && denominator > real(0);
@@ -161,4 +162,12 @@ FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixe
                 camera.intrinsics.y * y + camera.intrinsics.w);
   if (model == CAMERA_POLYNOMIAL_FISHEYE) pixel.y = pixel.y + camera.domain.w * x;
   return inside;
+}
+
+// Projects a direction of any positive length. Returns false outside the model's domain or the field of view.
+FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
+  real rho2 = squared_radius(point);
+  real d = sqrt(rho2 + point.z * point.z);
+  bool inside = project_in_domain(camera, model, point, rho2, d, pixel);
+  return inside && point.z > camera.domain.x * d;  // false of the zero vector
 }

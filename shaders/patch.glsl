@@ -3,6 +3,8 @@
 // source image with the source's real camera model and compared by ZNCC.
 
 #define NO_INFORMATION_COST 1.0f
+// A coordinate for sample_image() beyond every image's apron.
+#define OUTSIDE_TEXEL -1e6f
 
 FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
@@ -87,11 +89,14 @@ FN bool project_in_front(CameraParameters camera, int model, vec3 direction, flo
   return inside && w > 0.0f;
 }
 
+// Direction in the source of the plane's point on a reference ray.
+FN vec3 warp_direction(PlaneWarp warp, vec3 ray) {
+  return vec3(dot(warp.row0, ray), dot(warp.row1, ray), dot(warp.row2, ray));
+}
+
 // Projects the plane's point on one reference ray into a source; false where the plane is not in front.
 FN bool warp_ray(PlaneWarp warp, CameraParameters camera, int model, vec3 ray, OUT(vec2) position) {
-  float w = dot(warp.m, ray);
-  vec3 direction = vec3(dot(warp.row0, ray), dot(warp.row1, ray), dot(warp.row2, ray));
-  return project_in_front(camera, model, direction, w, position);
+  return project_in_front(camera, model, warp_direction(warp, ray), dot(warp.m, ray), position);
 }
 
 FN bool warp_pixel(CONTEXT_ARGUMENT PlaneWarp warp, CameraParameters camera, int model, ivec2 pixel,
@@ -140,6 +145,18 @@ FN bool in_some_source(CONTEXT_ARGUMENT vec3 ray, vec3 m) {
     if (pixel_in_source(CONTEXT source_at(CONTEXT i), ray, m, q)) return true;
   }
   return false;
+}
+
+// Whether the plane is in front at the corners of the patch, and so everywhere in it.
+FN bool patch_is_in_front(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  for (int i = 0; i < 4; ++i) {
+    int x = pixel.x + ((i & 1) == 0 ? -WINDOW_RADIUS : WINDOW_RADIUS);
+    int y = pixel.y + (i < 2 ? -WINDOW_RADIUS : WINDOW_RADIUS);
+    vec4 ray = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(x, y)));
+    if (dot(m, vec3(ray.x, ray.y, ray.z)) < 0.0f) return false;
+  }
+  return true;
 }
 
 // Second-order map of pixel offsets into the source: u = u0 + x ux + y uy + x^2 uxx + x y uxy + y^2 uyy.
@@ -217,7 +234,7 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(CONTEXT centre));
   start.centre_a = intensity_at(CONTEXT REFERENCE, pixel);
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
-  if (!mapped) return true;
+  if (!mapped) return patch_is_in_front(CONTEXT pixel, m);
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
   start.map.u0 = texel_at(CONTEXT start.map.u0);
   vec2 scale = texel_scale(CONTEXT_ONLY);
@@ -343,15 +360,20 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
         float a = intensity_in_row(intensities_of_row, dx);
         vec2 texel;
-        bool seen = true;
         if (WARP == WARP_EXACT) {
           vec4 ray = ray_in_row(rays_of_row, dx);
-          seen = warp_ray(start.warp, camera_of_samples, model, vec3(ray.x, ray.y, ray.z), texel);
+          vec3 direction = warp_direction(start.warp, vec3(ray.x, ray.y, ray.z));
+          float rho2 = squared_radius(direction);
+          float d = sqrt(rho2 + direction.z * direction.z);
+          bool inside = project_in_domain(camera_of_samples, model, direction, rho2, d, texel);
+          // The source is masked there, as it is outside its field of view. A condition would be kept in a register until
+          // the sample is there.
+          texel.x = inside ? texel.x : OUTSIDE_TEXEL;
         } else {
           texel = map_offset(CONTEXT row, float(dx));
         }
         float b = sample_image(CONTEXT source, camera.size, texel);
-        seen = seen && min(a, b) >= 0.0f;
+        bool seen = min(a, b) >= 0.0f;
         a -= start.centre_a;
         b -= start.centre_b;
         float weight = sample_weight(CONTEXT a, inverse_scale);

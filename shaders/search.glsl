@@ -79,12 +79,17 @@ FN float nearness_penalty(CONTEXT_ARGUMENT float w) {
   return PARAMETERS.support.w * nearness / (1.0f + nearness);
 }
 
+// Whether a candidate may be better than the held hypothesis: it is another plane, which the pixel may hold.
+FN bool takes_a_patch(CONTEXT_ARGUMENT vec3 ray, vec4 held, vec3 m) {
+  bool same = m.x == held.x && m.y == held.y && m.z == held.z;
+  return !same && admissible(CONTEXT ray, m);
+}
+
 // The better of the held hypothesis (m, cost) and a candidate. `small`: difference of inverse distance up to which
 // the farther of the two is not preferred, which would pull at planes that are matched. The preference is in proportion
 // to the held cost: on a wall's gradient of brightness all planes match well, and a little better means much.
 FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m, float small) {
-  bool same = m.x == held.x && m.y == held.y && m.z == held.z;
-  if (same || !admissible(CONTEXT ray, m)) return held;
+  if (!takes_a_patch(CONTEXT ray, held, m)) return held;
   float cost = patch_cost(CONTEXT pixel, m);
   if (cost >= INVALID_COST) return held;
   float w = dot(m, ray);
@@ -95,6 +100,16 @@ FN vec4 better_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, vec3 m, flo
   }
   if (cost + handicap < held.w) return vec4(m, cost);
   return held;
+}
+
+// Whether the pixel has not tried a neighbour's plane yet. It tries them all in each iteration, and a plane that was not
+// better once is never better, unless far planes are preferred to nearer ones. Until they are checked, planes have the
+// iteration in which they were taken in the map of checks.
+FN bool is_new_plane(CONTEXT_ARGUMENT ivec2 neighbour) {
+  if (PASS.iteration == 1 || PASS.colour < 0 || PARAMETERS.support.w > 0.0f) return true;
+  // Neighbours are of the other colour, which precedes the second one's pixels.
+  int since = PASS.iteration - (PASS.colour == 0 ? 1 : 0);
+  return check_at(CONTEXT REFERENCE, neighbour).x >= float(since);
 }
 
 // Candidate i of a pixel: the planes of the four neighbours, then random perturbations of the held plane with
@@ -110,6 +125,7 @@ FN vec3 candidate_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, int i
   ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
   if ((PASS.neighbours & side) == 0) return vec3(0.0f, 0.0f, 0.0f);
   if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) return vec3(0.0f, 0.0f, 0.0f);
+  if (!is_new_plane(CONTEXT q)) return vec3(0.0f, 0.0f, 0.0f);
   vec4 neighbour = hypothesis_at(CONTEXT REFERENCE, q);
   return vec3(neighbour.x, neighbour.y, neighbour.z);
 }
@@ -136,11 +152,22 @@ FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   if (usable_ray.w == 0.0f) return;
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
-  // One loop for all candidates: the cost function is then compiled once.
+  vec4 before = hypothesis_at(CONTEXT REFERENCE, pixel);
+  vec4 held = before;
+  // One loop for all candidates: the cost function is then compiled once. Threads that run at once wait for each other's
+  // patches, so each goes on to its next candidate that takes one.
   int candidates = 4 + PARAMETERS.search.y;
-  for (int i = 0; i < candidates; ++i) {
-    held = better_of(CONTEXT pixel, ray, held, candidate_plane(CONTEXT pixel, ray, held, i), 0.0f);
+  int next = 0;
+  while (next < candidates) {
+    vec3 m = candidate_plane(CONTEXT pixel, ray, held, next++);
+    while (next < candidates && !takes_a_patch(CONTEXT ray, held, m)) {
+      m = candidate_plane(CONTEXT pixel, ray, held, next++);
+    }
+    held = better_of(CONTEXT pixel, ray, held, m, 0.0f);
+  }
+  bool taken = held.x != before.x || held.y != before.y || held.z != before.z;
+  if (taken || PASS.iteration == 1) {
+    store_check(CONTEXT REFERENCE, pixel, vec4(taken ? float(PASS.iteration) : 0.0f, 0.0f, 0.0f, 0.0f));
   }
   store_hypothesis(CONTEXT REFERENCE, pixel, held);
 }

@@ -11,7 +11,9 @@ namespace {
 // again by running the functions with numbers that count.
 constexpr int side_of_source = 21;  // a rotation, a scalar product and a sum
 constexpr int warp_through = 18;
-constexpr int warp_ray_before_projection = 20;
+constexpr int warp_direction = 15;
+constexpr int scalar_product = 5;  // what is in front
+constexpr int limit_of_field_of_view = 1;
 constexpr int map_row_affine = 8;
 constexpr int map_row_quadratic = 32;
 constexpr int map_offset_affine = 4;
@@ -36,9 +38,9 @@ int camera_of_texels(int model) {
 /// Texture units filter by themselves.
 int sample_image(int filter) { return filter == static_cast<int>(Filter::exact) ? 11 : 0; }
 
-/// Of project(); sources of several models count as pinholes, which take least.
+/// Of project_in_domain(); sources of several models count as pinholes, which take least.
 int projection(int model) {
-  constexpr int common = 7;       // the length, and the field of view's limit
+  constexpr int common = 6;       // the length
   constexpr int perspective = 3;  // a reciprocal and two products with it
   constexpr int decentring = 22;
   constexpr int radial = 6;
@@ -96,11 +98,12 @@ enum Map : unsigned {
   quarter_of_planes = 256,  // the coarser level's
   finer_intensities = 512,
   texels = 1024,
+  half_of_checks = 2048,
 };
 
 int bytes_of(unsigned maps, const KernelConstants& c) {
   const int of_texels = c.texels_per_pixel * c.texels_per_pixel * bytes_of_texel(c);
-  const std::array<int, 11> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, of_texels};
+  const std::array<int, 12> bytes = {16, 4, 16, 16, 16, 4, 4, 8, 4, 16, of_texels, 8};
   int sum = 0;
   for (unsigned i = 0; i < bytes.size(); ++i) {
     if ((maps >> i & 1) != 0) sum += bytes[i];
@@ -120,9 +123,9 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
     case Kernel::initialise:
       return {seen, texels, plane};
     case Kernel::iterate:
-      return {seen | plane, texels, half_of_planes};
+      return {seen | plane | checks, texels, half_of_planes | half_of_checks};
     case Kernel::iterate_raster:
-      return {seen | plane, texels, plane};
+      return {seen | plane, texels, plane | checks};
     case Kernel::transfer_clear:
       return {0, 0, nearest | winner};
     case Kernel::transfer_nearest:
@@ -190,18 +193,20 @@ PatchOperations patch_operations(const KernelConstants& c) {
   const bool quadratic = c.warp == static_cast<int>(PatchWarp::quadratic);
   const bool is_scaled = c.texels_per_pixel > 1;
   const int weighting = c.weighted != 0 ? weight_of_sample : 0;
-  const int warp_ray = warp_ray_before_projection + projection(c.camera_model);
+  const int warp_sample = warp_direction + projection(c.camera_model);
+  const int warp_ray = warp_sample + scalar_product + limit_of_field_of_view;
   const int map_offset = quadratic ? map_offset_quadratic : map_offset_affine;
   // Two differences from the centre, a count, five sums of intensities and their products; weights
   // take a sum and two products more.
   const int sums = 2 + 1 + 8 + (c.weighted != 0 ? 3 : 0);
   PatchOperations operations;
   operations.of_sample =
-      weighting + (exact ? warp_ray : map_offset) + sample_image(c.filter) + sums;
+      weighting + (exact ? warp_sample : map_offset) + sample_image(c.filter) + sums;
   operations.of_patch =
       side_of_source + warp_through + warp_ray + texel_at(c) + sample_image(c.filter) + zncc_cost;
   if (exact) {
-    operations.of_patch += texel_at(c) + (is_scaled ? camera_of_texels(c.camera_model) : 0);
+    operations.of_patch +=
+        4 * scalar_product + texel_at(c) + (is_scaled ? camera_of_texels(c.camera_model) : 0);
   } else {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;

@@ -484,7 +484,7 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   EXPECT_THAT(message_of_match(), HasSubstr("largest image width is 40"));
   FaultyLoader::faults() = {.largest_resource = 1000};
   EXPECT_THAT(message_of_match(), HasSubstr("its maxResourceSize is 1 MiB"));
-  FaultyLoader::faults() = {.largest_buffer = 50000};
+  FaultyLoader::faults() = {.type = type_of_software, .largest_buffer = 50000};
   EXPECT_THAT(message_of_match(),
               HasSubstr("the viewing rays of 1 MiB: its maxTexelBufferElements"));
   FaultyLoader::faults() = {.type = type_of_gpu, .largest_buffer = 50000};

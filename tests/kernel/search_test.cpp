@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <set>
 
 #include "kernel_fixture.h"
@@ -156,6 +157,47 @@ TEST_F(Candidates, AreDrawnFromAroundWhatIsHeldToEitherSide) {
     EXPECT_GT(axis.high, 0.9 * turn);
     EXPECT_LT(axis.high, 1.6 * turn);
   }
+}
+
+/// The planes of `iterations` of the paper's search, all of which start with such checks.
+cv::Mat planes_after(int iterations, std::optional<float> checks) {
+  Options options = wide_range("paper");
+  options.window_radius = 2;
+  KernelFixture fixture(fisheye_rig(48), options);
+  fixture.set_reference(0);
+  const auto over_pixels = [&](int colour, const auto& function) {
+    fixture.pass().colour = colour;
+    for (int y = 0; y < 48; ++y) {
+      for (int x = colour < 0 ? 0 : (y + colour) % 2; x < 48; x += colour < 0 ? 1 : 2) {
+        function(fixture.context(), ivec2{x, y});
+      }
+    }
+  };
+  over_pixels(-1, kernel::cpu::initialise_pixel);
+  fixture.pass().neighbours = NEIGHBOUR_LEFT | NEIGHBOUR_RIGHT | NEIGHBOUR_UP | NEIGHBOUR_DOWN;
+  for (int iteration = 1; iteration <= iterations; ++iteration) {
+    fixture.pass().iteration = iteration;
+    for (int colour = 0; colour < 2; ++colour) {
+      if (checks) fixture.view(0).checks.setTo(cv::Scalar::all(*checks));
+      over_pixels(colour, kernel::cpu::iterate_pixel);
+    }
+  }
+  return fixture.view(0).hypotheses.clone();
+}
+
+TEST(Propagation, TriesPlanesOnceWithTheBitsOfTryingThemAgain) {
+  constexpr float always_new = 1e9f;
+  constexpr float never_new = -1;
+  const cv::Mat planes = planes_after(5, std::nullopt);
+  EXPECT_EQ(cv::norm(planes, planes_after(5, always_new), cv::NORM_INF), 0);
+  // And without their neighbours' planes pixels find worse ones.
+  EXPECT_GT(cv::mean(planes_after(5, never_new))[3], 1.05 * cv::mean(planes)[3]);
+}
+
+TEST(Propagation, BeginsAnewWithEveryMatch) {
+  // As another match left them.
+  const cv::Mat planes = planes_after(1, std::nullopt);
+  EXPECT_EQ(cv::norm(planes, planes_after(1, -1.0f), cv::NORM_INF), 0);
 }
 
 TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {

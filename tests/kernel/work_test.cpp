@@ -199,14 +199,15 @@ TEST(Work, OfAScheduleAddsUp) {
   EXPECT_EQ(work.texels, 4 * work.samples);
   const PatchOperations of = patch_operations(schedule.constants);
   EXPECT_EQ(work.operations, pixels / 2 * 8 * (121 * of.of_sample + of.of_patch));
-  // Rays, the image, the source's texels and all planes read, one colour's planes written.
-  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 2 + 16) + pixels / 2 * 16);
+  // Rays, the image, the source's texels, all planes and when they were taken read, one colour's
+  // written.
+  EXPECT_EQ(work.bytes, pixels * (16 + 4 + 2 + 2 * 16) + pixels / 2 * (2 * 16));
   options.filter = Filter::exact;
   EXPECT_EQ(work_of(make_schedule(fisheye_rig(64), options), iterate).bytes,
-            pixels * (16 + 4 + 4 + 16) + pixels / 2 * 16);
+            pixels * (16 + 4 + 4 + 2 * 16) + pixels / 2 * (2 * 16));
   options.interpolation = Interpolation::cubic;
   EXPECT_EQ(work_of(make_schedule(fisheye_rig(64), options), iterate).bytes,
-            pixels * (16 + 4 + 4 * 4 + 16) + pixels / 2 * 16);
+            pixels * (16 + 4 + 4 * 4 + 2 * 16) + pixels / 2 * (2 * 16));
   for (const Dispatch& dispatch : schedule.dispatches) {
     EXPECT_GT(work_of(schedule, dispatch).bytes, 0) << to_string(dispatch.kernel);
   }
