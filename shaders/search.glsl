@@ -159,10 +159,11 @@ FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   int candidates = 4 + PARAMETERS.search.y;
   int next = 0;
   while (next < candidates) {
-    vec3 m = candidate_plane(CONTEXT pixel, ray, held, next++);
-    while (next < candidates && !takes_a_patch(CONTEXT ray, held, m)) {
-      m = candidate_plane(CONTEXT pixel, ray, held, next++);
-    }
+    vec3 m;
+    do {
+      m = candidate_plane(CONTEXT pixel, ray, held, next);
+      ++next;
+    } while (next < candidates && !takes_a_patch(CONTEXT ray, held, m));
     held = better_of(CONTEXT pixel, ray, held, m, 0.0f);
   }
   bool taken = held.x != before.x || held.y != before.y || held.z != before.z;
