@@ -2,7 +2,9 @@
 // The kernels' patch cost against a slow, literal double-precision reference.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 
 #include "kernel_fixture.h"
@@ -233,6 +235,30 @@ TEST(PatchCostRules, PlaneBetweenTheCamerasIsInvalid) {
     EXPECT_EQ(kernel::cpu::patch_cost(fixture.context(), ivec2(x, 32), vec3(m.x(), m.y(), m.z())),
               INVALID_COST);
   }
+}
+
+TEST(PatchCostRules, AnExactPatchLiesInFrontAltogether) {
+  // Rays at the corners of a patch of 9x9 pixels are tens of degrees from the middle one.
+  Options options = wide_range("paper");
+  options.window_radius = 4;
+  options.min_texture = 0;
+  KernelFixture fixture(fisheye_rig(32), options);
+  fixture.set_reference(0);
+  const ivec2 pixel(16, 16);
+  const Eigen::Vector3d axis = fixture.ray(0, pixel);
+  const Eigen::Vector3d corner = fixture.ray(0, {20, 20});
+  const Eigen::Vector3d sideways = (corner - axis.dot(corner) * axis).normalized();
+  const double angle = std::acos(axis.dot(corner));
+  const auto cost = [&](double tilt) {
+    const Eigen::Vector3d m = 0.5 * (axis - std::tan(tilt) * sideways);
+    return kernel::cpu::patch_cost(
+        fixture.context(), pixel,
+        vec3(static_cast<float>(m.x()), static_cast<float>(m.y()), static_cast<float>(m.z())));
+  };
+  // The corner's ray runs along the plane when that is tilted by a right angle less its own.
+  const double along_corner = std::numbers::pi / 2 - angle;
+  EXPECT_LT(cost(along_corner - 0.02), INVALID_COST);
+  EXPECT_EQ(cost(along_corner + 0.02), INVALID_COST);
 }
 
 TEST(PatchCostRules, MeanOfTheBestSources) {
