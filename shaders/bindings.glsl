@@ -99,7 +99,7 @@ RayRow ray_row(int view, ivec2 p) { return in_maps(view, p); }
 
 vec4 ray_in_row(RayRow row, int dx) { return LOAD_MAP(rays, row + dx); }
 
-vec4 ray_at(int view, ivec2 p) { return LOAD_MAP(rays, in_maps(view, p)); }
+vec4 ray_at(int view, ivec2 p) { return ray_in_row(ray_row(view, p), 0); }
 
 #ifdef TEXEL_LOADS
 

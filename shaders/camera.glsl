@@ -100,12 +100,11 @@ FN real2 distort(CameraParameters camera, int model, real x, real y, real q) {
                distorted.y + q * (camera.prism.z + q * camera.prism.w));
 }
 
-// The squared distance from the optical axis.
-FN real squared_radius(real3 point) { return point.x * point.x + point.y * point.y; }
-
-// Projects a direction at this squared distance from the axis, d its length. `model` repeats camera.size.z so that a
-// caller can pass a compile-time constant. Returns false outside the model's domain, wherever the field of view ends.
-FN bool project_in_domain(CameraParameters camera, int model, real3 point, real rho2, real d, OUT(real2) pixel) {
+// Projects a direction, d its length. `model` repeats camera.size.z so that a caller can pass a compile-time constant.
+// Returns false outside the model's domain, wherever the field of view ends.
+FN bool project_in_domain(CameraParameters camera, int model, real3 point, OUT(real) d, OUT(real2) pixel) {
+  real rho2 = point.x * point.x + point.y * point.y;
+  d = sqrt(rho2 + point.z * point.z);
   bool inside = true;
   real x = real(0);
   real y = real(0);
@@ -166,8 +165,7 @@ FN bool project_in_domain(CameraParameters camera, int model, real3 point, real 
 
 // Projects a direction of any positive length. Returns false outside the model's domain or the field of view.
 FN bool project(CameraParameters camera, int model, real3 point, OUT(real2) pixel) {
-  real rho2 = squared_radius(point);
-  real d = sqrt(rho2 + point.z * point.z);
-  bool inside = project_in_domain(camera, model, point, rho2, d, pixel);
+  real d;
+  bool inside = project_in_domain(camera, model, point, d, pixel);
   return inside && point.z > camera.domain.x * d;  // false of the zero vector
 }

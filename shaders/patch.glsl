@@ -363,9 +363,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
         if (WARP == WARP_EXACT) {
           vec4 ray = ray_in_row(rays_of_row, dx);
           vec3 direction = warp_direction(start.warp, vec3(ray.x, ray.y, ray.z));
-          float rho2 = squared_radius(direction);
-          float d = sqrt(rho2 + direction.z * direction.z);
-          bool inside = project_in_domain(camera_of_samples, model, direction, rho2, d, texel);
+          float d;
+          bool inside = project_in_domain(camera_of_samples, model, direction, d, texel);
           // The source is masked there, as it is outside its field of view. A condition would be kept in a register until
           // the sample is there.
           texel.x = inside ? texel.x : OUTSIDE_TEXEL;

@@ -79,10 +79,11 @@ FN float nearness_penalty(CONTEXT_ARGUMENT float w) {
   return PARAMETERS.support.w * nearness / (1.0f + nearness);
 }
 
+FN bool is_same_plane(vec4 held, vec3 m) { return m.x == held.x && m.y == held.y && m.z == held.z; }
+
 // Whether a candidate may be better than the held hypothesis: it is another plane, which the pixel may hold.
 FN bool takes_a_patch(CONTEXT_ARGUMENT vec3 ray, vec4 held, vec3 m) {
-  bool same = m.x == held.x && m.y == held.y && m.z == held.z;
-  return !same && admissible(CONTEXT ray, m);
+  return !is_same_plane(held, m) && admissible(CONTEXT ray, m);
 }
 
 // The better of the held hypothesis (m, cost) and a candidate. `small`: difference of inverse distance up to which
@@ -166,7 +167,7 @@ FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     } while (next < candidates && !takes_a_patch(CONTEXT ray, held, m));
     held = better_of(CONTEXT pixel, ray, held, m, 0.0f);
   }
-  bool taken = held.x != before.x || held.y != before.y || held.z != before.z;
+  bool taken = !is_same_plane(before, vec3(held.x, held.y, held.z));
   if (taken || PASS.iteration == 1) {
     store_check(CONTEXT REFERENCE, pixel, vec4(taken ? float(PASS.iteration) : 0.0f, 0.0f, 0.0f, 0.0f));
   }

@@ -216,17 +216,14 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& texels_of
   write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
   write(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &places);
   write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &intensities);
-  const std::array<std::pair<Binding, const MapBuffer*>, 4> maps = {
-      {{binding_rays, &rays_},
-       {binding_hypotheses, &hypotheses_},
-       {binding_priors, &priors_},
-       {binding_checks, &checks_}}};
-  std::array<VkDescriptorBufferInfo, maps.size()> of_maps;
-  std::array<VkBufferView, maps.size()> views_of_maps;
-  for (std::size_t i = 0; i < maps.size(); ++i) {
-    of_maps[i] = buffer_info(maps[i].second->buffer);
-    views_of_maps[i] = maps[i].second->view.get();
-    write(maps[i].first, pipelines_.type_of_maps(), nullptr, &of_maps[i], &views_of_maps[i]);
+  std::array<VkDescriptorBufferInfo, map_count> of_maps;
+  std::array<VkBufferView, map_count> views_of_maps;
+  for (std::size_t i = 0; i < map_count; ++i) {
+    const MapBuffer& map = *maps()[i];
+    of_maps[i] = buffer_info(map.buffer);
+    views_of_maps[i] = map.view.get();
+    write(static_cast<Binding>(binding_rays + i), pipelines_.type_of_maps(), nullptr, &of_maps[i],
+          &views_of_maps[i]);
   }
   write(binding_texel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &texels, nullptr);
   write(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &texels, nullptr);
@@ -258,7 +255,7 @@ void VulkanBackend::start_memory() {
                                 std::bit_cast<std::uint32_t>(MASKED_INTENSITY));
   if (pipelines_.half_precision()) std::fill_n(masked.float32, 4, LOWEST_HALF);
   for (const LayeredImage& texels : texels_) clear(texels, masked);
-  for (const MapBuffer* map : {&rays_, &hypotheses_, &priors_, &checks_}) {
+  for (const MapBuffer* map : maps()) {
     context_.vk().vkCmdFillBuffer(commands, map->buffer.handle.get(), 0, VK_WHOLE_SIZE, 0);
   }
 
@@ -367,8 +364,7 @@ cv::Mat VulkanBackend::checks(int view) { return download(checks_, view); }
 
 std::size_t VulkanBackend::device_bytes() const {
   VkDeviceSize bytes = 0;
-  for (const MapBuffer* map : {&rays_, &hypotheses_, &priors_, &checks_})
-    bytes += map->buffer.bytes;
+  for (const MapBuffer* map : maps()) bytes += map->buffer.bytes;
   for (const LayeredImage& texels : texels_) bytes += texels.bytes;
   for (const Buffer* buffer :
        {&intensities_, &parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {

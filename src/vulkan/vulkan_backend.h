@@ -70,6 +70,12 @@ class VulkanBackend final : public Backend {
     int stride = 0;  ///< from row to row
   };
 
+  static constexpr std::size_t map_count = 4;
+  /// By their bindings, from binding_rays on.
+  std::array<const MapBuffer*, map_count> maps() const {
+    return {&rays_, &hypotheses_, &priors_, &checks_};
+  }
+
   void make_images(const VulkanContext& context);
   void make_buffers(const VulkanContext& context);
   void make_descriptor_sets();
