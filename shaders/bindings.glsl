@@ -6,7 +6,7 @@
 // Every kernel is compiled twice, for what is read with the same bits. GPUs gather or filter four texels in one
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
 // and have the four numbers of a sample in one texel, which takes them much less than four texels of one; so they read
-// maps as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels of half
+// maps and intensities as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels of half
 // precision (HALF_PRECISION).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy, and let the threads that a GPU runs at once share a tile
@@ -34,19 +34,24 @@ layout(set = 0, binding = 0, std140) uniform MatchBlock { MatchParameters parame
 layout(set = 0, binding = 1, std140) uniform PlaceBlock {
   ivec4 places[MAX_VIEWS];  // index of a view's pixel (0, 0) and what lies between rows: of maps; of intensities
 };
-layout(set = 0, binding = 2, std430) buffer IntensityBlock { float intensities[]; };
 #ifdef TEXEL_LOADS
+layout(set = 0, binding = 2, r32f) uniform imageBuffer intensities;
 layout(set = 0, binding = 3, rgba32f) readonly uniform imageBuffer rays;
 layout(set = 0, binding = 4, rgba32f) uniform imageBuffer hypotheses;
 layout(set = 0, binding = 5, rgba32f) uniform imageBuffer priors;
 layout(set = 0, binding = 6, rgba32f) uniform imageBuffer checks;
+#define LOAD_INTENSITY(index) imageLoad(intensities, index).x
+#define STORE_INTENSITY(index, value) imageStore(intensities, index, vec4(value))
 #define LOAD_MAP(map, index) imageLoad(map, index)
 #define STORE_MAP(map, index, value) imageStore(map, index, value)
 #else
+layout(set = 0, binding = 2, std430) buffer IntensityBlock { float intensities[]; };
 layout(set = 0, binding = 3, std430) readonly buffer RayBlock { vec4 rays[]; };
 layout(set = 0, binding = 4, std430) buffer HypothesisBlock { vec4 hypotheses[]; };
 layout(set = 0, binding = 5, std430) buffer PriorBlock { vec4 priors[]; };
 layout(set = 0, binding = 6, std430) buffer CheckBlock { vec4 checks[]; };
+#define LOAD_INTENSITY(index) intensities[index]
+#define STORE_INTENSITY(index, value) intensities[index] = value
 #define LOAD_MAP(map, index) map[index]
 #define STORE_MAP(map, index, value) map[index] = value
 #endif
@@ -86,7 +91,7 @@ IntensityRow intensity_row(int view, ivec2 p) {
   return place.z + p.y * place.w + p.x;
 }
 
-float intensity_in_row(IntensityRow row, int dx) { return intensities[row + dx]; }
+float intensity_in_row(IntensityRow row, int dx) { return LOAD_INTENSITY(row + dx); }
 
 // Views of a level follow each other, and sources are of the reference's level.
 int layer_of_texels(int view) { return view - pass.first_view; }
@@ -139,9 +144,7 @@ vec4 hypothesis_at(int view, ivec2 p) { return LOAD_MAP(hypotheses, in_maps(view
 
 void store_hypothesis(int view, ivec2 p, vec4 h) { STORE_MAP(hypotheses, in_maps(view, p), h); }
 
-void store_intensity(int view, ivec2 p, float intensity) {
-  intensities[intensity_row(view, p)] = intensity;
-}
+void store_intensity(int view, ivec2 p, float intensity) { STORE_INTENSITY(intensity_row(view, p), intensity); }
 
 vec4 prior_at(int view, ivec2 p) { return LOAD_MAP(priors, in_maps(view, p)); }
 

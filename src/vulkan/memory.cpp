@@ -61,8 +61,13 @@ Buffer make_buffer(const VulkanContext& context, VkDeviceSize bytes, VkBufferUsa
   return result;
 }
 
-void require_buffer_limit(const VulkanContext& context, VkDeviceSize bytes, const char* limit,
-                          VkDeviceSize offered, const std::string& purpose) {
+VkDeviceSize bytes_of(VkFormat format) {
+  return format == VK_FORMAT_R16_SFLOAT ? 2 : format == VK_FORMAT_R32_SFLOAT ? 4 : 16;
+}
+
+void require_buffer_limit(const VulkanContext& context, VkDeviceSize bytes,
+                          const std::string& limit, VkDeviceSize offered,
+                          const std::string& purpose) {
   if (bytes <= offered) return;
   throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " of " +
               mebibytes(bytes) + ": its " + limit + " is " + mebibytes(offered) +
@@ -87,10 +92,7 @@ void require_image_limits(const VulkanContext& context, VkFormat format, cv::Siz
   if (layers > static_cast<long long>(limits.maxArrayLayers)) {
     refuse("maxImageArrayLayers", std::to_string(limits.maxArrayLayers));
   }
-  const VkDeviceSize bytes_of_pixel = format == VK_FORMAT_R16_SFLOAT   ? 2
-                                      : format == VK_FORMAT_R32_SFLOAT ? 4
-                                                                       : 16;
-  const VkDeviceSize bytes = bytes_of_pixel * static_cast<VkDeviceSize>(size.width) *
+  const VkDeviceSize bytes = bytes_of(format) * static_cast<VkDeviceSize>(size.width) *
                              static_cast<VkDeviceSize>(size.height) *
                              static_cast<VkDeviceSize>(layers);
   if (bytes > limits.maxResourceSize) refuse("maxResourceSize", mebibytes(limits.maxResourceSize));
@@ -107,9 +109,9 @@ Buffer make_device_buffer(const VulkanContext& context, VkDeviceSize bytes,
   return make_buffer(context, bytes, usage, device_memory_type, purpose);
 }
 
-MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements,
+MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements, VkFormat format,
                           VkDescriptorType type, const std::string& purpose) {
-  constexpr VkDeviceSize bytes_of_element = 4 * sizeof(float);
+  const VkDeviceSize bytes_of_element = bytes_of(format);
   const VkDeviceSize bytes = elements * bytes_of_element;
   constexpr VkBufferUsageFlags transfers =
       VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
@@ -119,15 +121,15 @@ MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements,
         make_device_buffer(context, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | transfers, purpose);
     return map;
   }
-  require_buffer_limit(context, bytes, "maxTexelBufferElements times 16 bytes",
-                       context.properties().limits.maxTexelBufferElements * bytes_of_element,
-                       purpose);
+  require_buffer_limit(
+      context, bytes, "maxTexelBufferElements times " + std::to_string(bytes_of_element) + " bytes",
+      context.properties().limits.maxTexelBufferElements * bytes_of_element, purpose);
   map.buffer = make_device_buffer(context, bytes,
                                   VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT | transfers, purpose);
   VkBufferViewCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO;
   info.buffer = map.buffer.handle.get();
-  info.format = VK_FORMAT_R32G32B32A32_SFLOAT;
+  info.format = format;
   info.range = VK_WHOLE_SIZE;
   VkBufferView view = VK_NULL_HANDLE;
   context.check(context.vk().vkCreateBufferView(context.device(), &info, nullptr, &view),

@@ -16,8 +16,8 @@ struct Buffer {
   void* mapped = nullptr;
 };
 
-/// A buffer that kernels read and write as one array of four floats: as a storage buffer, or, with
-/// a view, as a texel buffer.
+/// A buffer that kernels read and write as one array of a float or of four: as a storage buffer,
+/// or, with a view, as a texel buffer.
 struct MapBuffer {
   Buffer buffer;
   Handle<VkBufferView> view;
@@ -35,8 +35,8 @@ struct LayeredImage {
 Buffer make_device_buffer(const VulkanContext& context, VkDeviceSize bytes,
                           VkBufferUsageFlags usage, const std::string& purpose);
 
-/// `type`: of its descriptors.
-MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements,
+/// `format`: of its elements; `type`: of its descriptors.
+MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements, VkFormat format,
                           VkDescriptorType type, const std::string& purpose);
 
 /// Host-visible, coherent and, where there is such memory, cached: for uploads and downloads.

@@ -156,10 +156,10 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   if (limits.maxComputeWorkGroupInvocations < 128) {
     return too_low("maxComputeWorkGroupInvocations", 128, limits.maxComputeWorkGroupInvocations);
   }
-  // With those of conversions; software devices bind maps as storage images.
+  // With those of conversions; software devices bind intensities and maps as storage images.
   const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  const std::uint32_t buffers = in_software ? 4 : 8;
-  const std::uint32_t images = in_software ? 5 : 1;
+  const std::uint32_t buffers = in_software ? 3 : 8;
+  const std::uint32_t images = in_software ? 6 : 1;
   if (limits.maxPerStageDescriptorStorageBuffers < buffers) {
     return too_low("maxPerStageDescriptorStorageBuffers", buffers,
                    limits.maxPerStageDescriptorStorageBuffers);

@@ -111,7 +111,7 @@ void Pipelines::make_layouts(const VulkanContext& context) {
   const std::array bindings = {
       binding(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
       binding(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER),
-      binding(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
+      binding(binding_intensities, type_of_maps()),
       binding(binding_rays, type_of_maps()),
       binding(binding_hypotheses, type_of_maps()),
       binding(binding_priors, type_of_maps()),

@@ -42,9 +42,9 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 class Pipelines {
  public:
   /// `sampled`: texels are read through the texture units instead of as storage images, which
-  /// hold them in another format, and maps as storage buffers instead of texel buffers
-  /// (shaders/bindings.glsl). Those that texture units filter
-  /// have half precision where the device can write it.
+  /// hold them in another format, and intensities and maps as storage buffers instead of texel
+  /// buffers (shaders/bindings.glsl). Those that texture units filter have half precision where the
+  /// device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);
 

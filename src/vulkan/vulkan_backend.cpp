@@ -12,6 +12,7 @@ namespace widestereo {
 namespace {
 
 constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
+constexpr VkFormat format_of_maps = VK_FORMAT_R32G32B32A32_SFLOAT;
 /// Texels of fewer bytes take texture units fewer cycles.
 constexpr VkFormat format_of_filtered_texels = VK_FORMAT_R16_SFLOAT;
 /// Without texture units: each with the neighbours that a bilinear sample reads.
@@ -150,11 +151,11 @@ void VulkanBackend::make_buffers(const VulkanContext& context) {
     pixels += static_cast<VkDeviceSize>(size.width) * static_cast<VkDeviceSize>(size.height);
     intensities += static_cast<VkDeviceSize>(whole.width) * static_cast<VkDeviceSize>(whole.height);
   }
-  intensities_ = make_device_buffer(
-      context, intensities * sizeof(float),
-      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, "the images");
+  intensities_ = make_map_buffer(context, intensities, intensity_format, pipelines_.type_of_maps(),
+                                 "the images");
   const auto make_map = [&](const char* purpose) {
-    return make_map_buffer(context, pixels + APRON, pipelines_.type_of_maps(), purpose);
+    return make_map_buffer(context, pixels + APRON, format_of_maps, pipelines_.type_of_maps(),
+                           purpose);
   };
   rays_ = make_map("the viewing rays");
   hypotheses_ = make_map("the planes");
@@ -178,8 +179,8 @@ void VulkanBackend::make_descriptor_sets() {
       {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * levels},
       {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, levels},
       {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, levels},
-      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 3 * levels},
-      {pipelines_.type_of_maps(), 4 * levels},
+      {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * levels},
+      {pipelines_.type_of_maps(), static_cast<std::uint32_t>(map_count) * levels},
   }};
   descriptor_pool_ = make_descriptor_pool(context_, levels, pool_sizes);
   for (const LayeredImage& texels : texels_) {
@@ -208,22 +209,20 @@ VkDescriptorSet VulkanBackend::make_descriptor_set(const LayeredImage& texels_of
   };
   const VkDescriptorImageInfo texels = {sampler_.get(), texels_of_level.view.get(),
                                         VK_IMAGE_LAYOUT_GENERAL};
-  const VkDescriptorBufferInfo intensities = buffer_info(intensities_);
   const VkDescriptorBufferInfo parameters = buffer_info(parameters_);
   const VkDescriptorBufferInfo places = buffer_info(places_);
   const VkDescriptorBufferInfo nearest = buffer_info(transfer_nearest_);
   const VkDescriptorBufferInfo winner = buffer_info(transfer_winner_);
   write(binding_parameters, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &parameters);
   write(binding_places, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, nullptr, &places);
-  write(binding_intensities, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, nullptr, &intensities);
   std::array<VkDescriptorBufferInfo, map_count> of_maps;
   std::array<VkBufferView, map_count> views_of_maps;
   for (std::size_t i = 0; i < map_count; ++i) {
     const MapBuffer& map = *maps()[i];
     of_maps[i] = buffer_info(map.buffer);
     views_of_maps[i] = map.view.get();
-    write(static_cast<Binding>(binding_rays + i), pipelines_.type_of_maps(), nullptr, &of_maps[i],
-          &views_of_maps[i]);
+    write(static_cast<Binding>(binding_intensities + i), pipelines_.type_of_maps(), nullptr,
+          &of_maps[i], &views_of_maps[i]);
   }
   write(binding_texel_texture, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, &texels, nullptr);
   write(binding_texels, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, &texels, nullptr);
@@ -251,12 +250,12 @@ void VulkanBackend::start_memory() {
   };
   VkClearColorValue masked{};
   std::fill_n(masked.float32, 4, MASKED_INTENSITY);
-  context_.vk().vkCmdFillBuffer(commands, intensities_.handle.get(), 0, VK_WHOLE_SIZE,
-                                std::bit_cast<std::uint32_t>(MASKED_INTENSITY));
   if (pipelines_.half_precision()) std::fill_n(masked.float32, 4, LOWEST_HALF);
   for (const LayeredImage& texels : texels_) clear(texels, masked);
   for (const MapBuffer* map : maps()) {
-    context_.vk().vkCmdFillBuffer(commands, map->buffer.handle.get(), 0, VK_WHOLE_SIZE, 0);
+    const float value = map == &intensities_ ? MASKED_INTENSITY : 0;
+    context_.vk().vkCmdFillBuffer(commands, map->buffer.handle.get(), 0, VK_WHOLE_SIZE,
+                                  std::bit_cast<std::uint32_t>(value));
   }
 
   PlaceBlock block;
@@ -351,7 +350,7 @@ void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
                     row});
   }
   const VkCommandBuffer commands = submissions_[0]->begin();
-  context_.vk().vkCmdCopyBuffer(commands, staging_.handle.get(), intensities_.handle.get(),
+  context_.vk().vkCmdCopyBuffer(commands, staging_.handle.get(), intensities_.buffer.handle.get(),
                                 static_cast<std::uint32_t>(rows.size()), rows.data());
   submissions_[0]->submit();
   submissions_[0]->wait();
@@ -367,7 +366,7 @@ std::size_t VulkanBackend::device_bytes() const {
   for (const MapBuffer* map : maps()) bytes += map->buffer.bytes;
   for (const LayeredImage& texels : texels_) bytes += texels.bytes;
   for (const Buffer* buffer :
-       {&intensities_, &parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
+       {&parameters_, &places_, &transfer_nearest_, &transfer_winner_, &staging_}) {
     bytes += buffer->bytes;
   }
   return static_cast<std::size_t>(bytes);

@@ -70,10 +70,10 @@ class VulkanBackend final : public Backend {
     int stride = 0;  ///< from row to row
   };
 
-  static constexpr std::size_t map_count = 4;
-  /// By their bindings, from binding_rays on.
+  static constexpr std::size_t map_count = 5;
+  /// By their bindings, from binding_intensities on.
   std::array<const MapBuffer*, map_count> maps() const {
-    return {&rays_, &hypotheses_, &priors_, &checks_};
+    return {&intensities_, &rays_, &hypotheses_, &priors_, &checks_};
   }
 
   void make_images(const VulkanContext& context);
@@ -103,7 +103,7 @@ class VulkanBackend final : public Backend {
   KernelConstants constants_;
   long long max_samples_;
   Pipelines pipelines_;
-  Buffer intensities_;
+  MapBuffer intensities_;
   MapBuffer rays_;
   MapBuffer hypotheses_;
   MapBuffer priors_;
