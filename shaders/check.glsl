@@ -4,7 +4,7 @@
 
 // The surroundings of a pixel: a sparse grid of this radius and step. A vote asks for speckles alone, which takes fewer.
 #define SUPPORT_RADIUS 20
-#define SUPPORT_STEP 4
+#define SUPPORT_STEP 8
 #define SUPPORT_STEP_FOR_VOTE 10
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f

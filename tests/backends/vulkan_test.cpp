@@ -486,7 +486,7 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   EXPECT_THAT(message_of_match(), HasSubstr("its maxResourceSize is 1 MiB"));
   FaultyLoader::faults() = {.type = type_of_software, .largest_buffer = 50000};
   EXPECT_THAT(message_of_match(),
-              HasSubstr("the viewing rays of 1 MiB: its maxTexelBufferElements"));
+              HasSubstr("the images of 1 MiB: its maxTexelBufferElements times 4 bytes"));
   FaultyLoader::faults() = {.type = type_of_gpu, .largest_buffer = 50000};
   EXPECT_THAT(message_of_match(),
               HasSubstr("the viewing rays of 1 MiB: its maxStorageBufferRange"));
