@@ -2,10 +2,9 @@
 // What is known about a pixel once all views have planes: agreement with the sources' own planes and with the
 // surroundings, texture, parallax and tilt, summed up as reasons for rejection and a confidence.
 
-// The surroundings of a pixel: a sparse grid of this radius and step. A vote asks for speckles alone, which takes fewer.
+// The surroundings of a pixel: a sparse grid of this radius and step.
 #define SUPPORT_RADIUS 20
 #define SUPPORT_STEP 8
-#define SUPPORT_STEP_FOR_VOTE 10
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
 // Of the surroundings' mean squared correlation: from a twentieth on, their planes count as known from the images.
@@ -129,14 +128,15 @@ FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
 
 // Of the surrounding planes: the share that puts the pixel's point where its own does (x) and EVIDENCE_SCALE times the
 // mean of their squared correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
-FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed, int step) {
+FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
   float planes = 0.0f;
   float supporting = 0.0f;
   float evidence = 0.0f;
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  ivec4 grid = grid_in_image(size, pixel, ivec2(-SUPPORT_RADIUS, -SUPPORT_RADIUS), SUPPORT_RADIUS, ivec2(step, step));
-  for (int dy = grid.y; dy <= grid.w; dy += step) {
-    for (int dx = grid.x; dx <= grid.z; dx += step) {
+  ivec4 grid = grid_in_image(size, pixel, ivec2(-SUPPORT_RADIUS, -SUPPORT_RADIUS), SUPPORT_RADIUS,
+                             ivec2(SUPPORT_STEP, SUPPORT_STEP));
+  for (int dy = grid.y; dy <= grid.w; dy += SUPPORT_STEP) {
+    for (int dx = grid.x; dx <= grid.z; dx += SUPPORT_STEP) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
       // No branches, so that planes are loaded ahead.
       float counts = plane.w < INVALID_COST && (dx != 0 || dy != 0) ? 1.0f : 0.0f;
@@ -194,8 +194,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     vec4 limits = PARAMETERS.check_limits;
     bool for_vote = (PASS.candidates & CHECK_FOR_VOTE) != 0u;
-    int step = for_vote ? SUPPORT_STEP_FOR_VOTE : SUPPORT_STEP;
-    vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed, step);
+    vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
     bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
     float least_variance = PARAMETERS.patch_limits.x;
     if (least_variance > 0.0f && reference_variance(CONTEXT pixel) < least_variance) reasons |= REASON_NO_TEXTURE;
