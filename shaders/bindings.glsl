@@ -6,8 +6,8 @@
 // Every kernel is compiled twice, for what is read with the same bits. GPUs gather or filter four texels in one
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
 // and have the four numbers of a sample in one texel, which takes them much less than four texels of one; so they read
-// maps and intensities as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels of half
-// precision (HALF_PRECISION).
+// maps and intensities as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels
+// of half precision (HALF_PRECISION).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy, and let the threads that a GPU runs at once share a tile
 // (draw4_of_tile()); 128 invocations are legal everywhere.
