@@ -18,10 +18,11 @@
 namespace widestereo {
 namespace {
 
-/// Blur of both frames (pixels), coarse to fine: about twice that displacement is bridged.
-constexpr std::array<double, 4> blurs = {8, 4, 2, 1};
-constexpr int most_steps = 12;      // of each blur
-constexpr double last_step = 1e-6;  // radians, metres
+/// Both frames are reduced by these factors in turn and blurred by one pixel then: about twice that
+/// displacement (pixels) is bridged.
+constexpr std::array<int, 4> scales = {8, 4, 2, 1};
+constexpr int most_steps = 12;         // at each scale
+constexpr double least_gain = 0.0001;  // of a step: the share of the cost that it saves
 constexpr double points_per_view = 3000;
 constexpr std::size_t fewest_points = 200;
 /// Standard deviation to which every direction of motion must be determined: radians, and metres
@@ -31,14 +32,23 @@ constexpr double largest_uncertainty = 0.003;
 /// A point of the previous frame.
 struct Point {
   Eigen::Vector3d position;  ///< rig's frame
-  cv::Point pixel;           ///< of its own view
+  Eigen::Vector2d pixel;     ///< of its own view
 };
 
-/// One view at one blur.
-struct BlurredView {
+/// One view at one scale.
+struct ScaledView {
   cv::Mat_<float> previous;
   cv::Mat_<cv::Vec3f> now;  ///< intensity and its derivatives by x and y
   cv::Mat_<uchar> usable;   ///< 0: what lies outside the lens has been blurred into the pixel
+  int scale = 1;
+
+  Eigen::Vector2d pixel_at(const Eigen::Vector2d& pixel_of_view) const {
+    return ((pixel_of_view.array() + 0.5) / scale - 0.5).matrix();
+  }
+  bool is_usable(const Eigen::Vector2d& at) const {
+    return at.x() >= 0 && at.y() >= 0 && at.x() < now.cols - 1 && at.y() < now.rows - 1 &&
+           usable(static_cast<int>(at.y() + 0.5), static_cast<int>(at.x() + 0.5)) != 0;
+  }
 };
 
 struct Normals {
@@ -49,7 +59,8 @@ struct Normals {
   std::size_t points = 0;
 };
 
-cv::Vec3f bilinear(const cv::Mat_<cv::Vec3f>& image, const Eigen::Vector2d& at) {
+template <typename Value>
+Value bilinear(const cv::Mat_<Value>& image, const Eigen::Vector2d& at) {
   const int x = static_cast<int>(at.x());
   const int y = static_cast<int>(at.y());
   const auto fx = static_cast<float>(at.x() - x);
@@ -85,21 +96,31 @@ std::vector<Point> accepted_points(const View& view, const ViewResult& matched) 
   return points;
 }
 
-BlurredView blurred(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& usable,
-                    double sigma) {
-  BlurredView view;
-  cv::GaussianBlur(previous, view.previous, {}, sigma);
+/// Means of scale x scale pixels; a last, partial row or column is left out.
+cv::Mat reduced(const cv::Mat& image, int scale) {
+  const cv::Size size(std::max(1, image.cols / scale), std::max(1, image.rows / scale));
+  const cv::Rect whole(0, 0, std::min(image.cols, size.width * scale),
+                       std::min(image.rows, size.height * scale));
+  cv::Mat small;
+  cv::resize(image(whole), small, size, 0, 0, cv::INTER_AREA);
+  return small;
+}
+
+/// `usable`: 255 or 0.
+ScaledView scaled(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& usable, int scale) {
+  ScaledView view;
+  view.scale = scale;
+  cv::GaussianBlur(reduced(previous, scale), view.previous, {}, 1);
   cv::Mat smooth;
   cv::Mat dx;
   cv::Mat dy;
-  cv::GaussianBlur(now, smooth, {}, sigma);
+  cv::GaussianBlur(reduced(now, scale), smooth, {}, 1);
   cv::Sobel(smooth, dx, CV_32F, 1, 0, 3, 0.125);
   cv::Sobel(smooth, dy, CV_32F, 0, 1, 3, 0.125);
   cv::merge(std::vector<cv::Mat>{smooth, dx, dy}, view.now);
-  const int reach = 2 * static_cast<int>(std::ceil(sigma)) + 1;
-  cv::erode(usable, view.usable,
-            cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}), {-1, -1}, 1,
-            cv::BORDER_CONSTANT, cv::Scalar(255));
+  cv::erode(reduced(usable, scale) == 255, view.usable,
+            cv::getStructuringElement(cv::MORPH_RECT, {7, 7}), {-1, -1}, 1, cv::BORDER_CONSTANT,
+            cv::Scalar(255));
   return view;
 }
 
@@ -108,9 +129,12 @@ BlurredView blurred(const cv::Mat& previous, const cv::Mat& now, const cv::Mat& 
 class Alignment {
  public:
   Alignment(const Rig& rig, std::vector<std::vector<Point>> points)
-      : rig_(rig), points_(std::move(points)), brightness_(rig.views.size(), {1, 0}) {}
+      : rig_(rig),
+        points_(std::move(points)),
+        rows_(rig.views.size()),
+        brightness_(rig.views.size(), {1, 0}) {}
 
-  void refine(const std::vector<BlurredView>& views) {
+  void refine(const std::vector<ScaledView>& views) {
     Normals normals = linearise(views);
     for (int step = 0; step < most_steps && normals.points >= fewest_points; ++step) {
       const Eigen::VectorXd update = solve(normals);
@@ -118,17 +142,17 @@ class Alignment {
       const auto before = std::pair(motion_, brightness_);
       apply(update);
       const Normals next = linearise(views);
-      if (next.points < fewest_points || next.cost > normals.cost * (1 + 1e-3)) {
+      if (next.points < fewest_points || next.cost > normals.cost) {
         std::tie(motion_, brightness_) = before;
         return;
       }
+      if (next.cost >= normals.cost * (1 - least_gain)) return;
       normals = next;
-      if (update.head<6>().norm() < last_step) return;
     }
   }
 
   /// Whether every direction of motion is determined.
-  bool is_determined(const std::vector<BlurredView>& views) {
+  bool is_determined(const std::vector<ScaledView>& views) {
     const Normals normals = linearise(views);
     if (normals.points < fewest_points) return false;
     const Eigen::Index others = normals.information.rows() - 6;
@@ -148,10 +172,18 @@ class Alignment {
   const Eigen::Isometry3d& motion() const { return motion_; }
 
  private:
+  /// Unknowns of one view: turn and shift of the rig, its own gain and offset.
+  using Unknowns = Eigen::Matrix<double, 8, 1>;
+
   struct Row {
     double residual;
-    Eigen::Matrix<double, 1, 6> by_motion;
-    double intensity;  ///< of the previous frame: derivative by the gain
+    Unknowns by;  ///< its derivatives
+  };
+
+  struct ViewNormals {
+    Eigen::Matrix<double, 8, 8> information = Eigen::Matrix<double, 8, 8>::Zero();
+    Unknowns gradient = Unknowns::Zero();
+    double cost = 0;
   };
 
   double median_distance() const {
@@ -162,71 +194,77 @@ class Alignment {
     return percentile(distances, 0.5);
   }
 
-  std::vector<Row> rows_of(std::size_t i, const BlurredView& view) const {
-    std::vector<Row> rows;
+  /// rows_[i].
+  void set_rows(std::size_t i, const ScaledView& view) {
+    std::vector<Row>& rows = rows_[i];
+    rows.clear();
     const Eigen::Isometry3d camera_from_rig = rig_.views[i].world_from_camera.inverse();
     const PreparedCamera camera(rig_.views[i].camera);
-    for (const Point& point : points_[i]) {
-      if (view.usable(point.pixel) == 0) continue;
+    // Coarse scales must only come near.
+    const std::size_t stride = view.scale > 1 ? 2 : 1;
+    for (std::size_t k = 0; k < points_[i].size(); k += stride) {
+      const Point& point = points_[i][k];
+      const Eigen::Vector2d before = view.pixel_at(point.pixel);
+      if (!view.is_usable(before)) continue;
       const Eigen::Vector3d moved = motion_ * point.position;
       Eigen::Vector2d pixel;
       Eigen::Matrix<double, 2, 3> jacobian;
       if (!camera.project(camera_from_rig * moved, pixel, jacobian)) continue;
-      if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < view.now.cols - 1 &&
-            pixel.y() < view.now.rows - 1) ||
-          view.usable(static_cast<int>(pixel.y() + 0.5), static_cast<int>(pixel.x() + 0.5)) == 0) {
-        continue;
-      }
-      const cv::Vec3f seen = bilinear(view.now, pixel);
-      const double intensity = static_cast<double>(view.previous(point.pixel));
-      const Eigen::RowVector3d by_point =
-          Eigen::RowVector2f(seen[1], seen[2]).cast<double>() * jacobian * camera_from_rig.linear();
+      const Eigen::Vector2d after = view.pixel_at(pixel);
+      if (!view.is_usable(after)) continue;
+      const cv::Vec3f seen = bilinear(view.now, after);
+      const auto intensity = static_cast<double>(bilinear(view.previous, before));
+      const Eigen::RowVector3d by_point = Eigen::RowVector2f(seen[1], seen[2]).cast<double>() *
+                                          jacobian * camera_from_rig.linear() / view.scale;
       Row& row = rows.emplace_back();
       row.residual =
           static_cast<double>(seen[0]) - brightness_[i][0] * intensity - brightness_[i][1];
-      row.by_motion << -by_point * cross_matrix(moved), by_point;
-      row.intensity = intensity;
+      row.by << (-by_point * cross_matrix(moved)).transpose(), by_point.transpose(), -intensity, -1;
     }
-    return rows;
   }
 
-  Normals linearise(const std::vector<BlurredView>& views) const {
-    std::vector<std::vector<Row>> of_views(views.size());
-    for_each_view(views.size(), [&](std::size_t i) { of_views[i] = rows_of(i, views[i]); });
+  static ViewNormals normals_of(const std::vector<Row>& rows, double deviation) {
+    ViewNormals normals;
+    for (const Row& row : rows) {
+      // Large where something moves by itself or was occluded.
+      const double doubt = doubt_of(row.residual, deviation);
+      const Unknowns weighted = row.by / (doubt * doubt);
+      normals.information.noalias() += weighted * row.by.transpose();
+      normals.gradient += row.residual * weighted;
+      normals.cost += row.residual * row.residual / doubt;
+    }
+    return normals;
+  }
+
+  Normals linearise(const std::vector<ScaledView>& views) {
+    for_each_view(views.size(), [&](std::size_t i) { set_rows(i, views[i]); });
     const Eigen::Index unknowns = 6 + 2 * static_cast<Eigen::Index>(views.size());
     Normals normals;
     normals.information = Eigen::MatrixXd::Zero(unknowns, unknowns);
     normals.gradient = Eigen::VectorXd::Zero(unknowns);
     std::vector<double> sizes;
-    for (const std::vector<Row>& rows : of_views) {
+    for (const std::vector<Row>& rows : rows_) {
       for (const Row& row : rows) sizes.push_back(std::abs(row.residual));
     }
     normals.points = sizes.size();
     if (sizes.empty()) return normals;
     const double scale = deviations_per_median * percentile(sizes, 0.5) + 1e-4;
     normals.variance = scale * scale;
-    for (std::size_t i = 0; i < of_views.size(); ++i) {
+    std::vector<ViewNormals> normals_of_views(views.size());
+    for_each_view(views.size(),
+                  [&](std::size_t i) { normals_of_views[i] = normals_of(rows_[i], scale); });
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const ViewNormals& of_view = normals_of_views[i];
       const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);
-      for (const Row& row : of_views[i]) {
-        // Large where something moves by itself or was occluded.
-        const double doubt = doubt_of(row.residual, scale);
-        const double weight = 1 / (doubt * doubt);
-        Eigen::Matrix<double, 8, 1> by;
-        by << row.by_motion.transpose(), -row.intensity, -1;
-        normals.information.topLeftCorner<6, 6>() +=
-            weight * by.head<6>() * by.head<6>().transpose();
-        normals.information.block<6, 2>(0, place) +=
-            weight * by.head<6>() * by.tail<2>().transpose();
-        normals.information.block<2, 2>(place, place) +=
-            weight * by.tail<2>() * by.tail<2>().transpose();
-        normals.gradient.head<6>() += weight * row.residual * by.head<6>();
-        normals.gradient.segment<2>(place) += weight * row.residual * by.tail<2>();
-        normals.cost += row.residual * row.residual / doubt;
-      }
+      normals.information.topLeftCorner<6, 6>() += of_view.information.topLeftCorner<6, 6>();
+      normals.information.block<6, 2>(0, place) = of_view.information.topRightCorner<6, 2>();
+      normals.information.block<2, 6>(place, 0) = of_view.information.bottomLeftCorner<2, 6>();
+      normals.information.block<2, 2>(place, place) = of_view.information.bottomRightCorner<2, 2>();
+      normals.gradient.head<6>() += of_view.gradient.head<6>();
+      normals.gradient.segment<2>(place) = of_view.gradient.tail<2>();
+      normals.cost += of_view.cost;
     }
     normals.cost /= static_cast<double>(normals.points);
-    normals.information.triangularView<Eigen::StrictlyLower>() =
-        normals.information.transpose().triangularView<Eigen::StrictlyLower>();
     return normals;
   }
 
@@ -252,6 +290,7 @@ class Alignment {
 
   const Rig& rig_;
   std::vector<std::vector<Point>> points_;
+  std::vector<std::vector<Row>> rows_;  // kept, as memory of this size is slow to get
   Eigen::Isometry3d motion_ = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Vector2d> brightness_;
 };
@@ -299,10 +338,10 @@ std::optional<Eigen::Isometry3d> estimate_motion(const Rig& rig,
     points[i] = accepted_points(rig.views[i], previous[i]);
   });
   Alignment alignment(rig, std::move(points));
-  std::vector<BlurredView> views(count);
-  for (const double blur : blurs) {
+  std::vector<ScaledView> views(count);
+  for (const int scale : scales) {
     for_each_view(count, [&](std::size_t i) {
-      views[i] = blurred(intensities[i][0], intensities[i][1], usable[i], blur);
+      views[i] = scaled(intensities[i][0], intensities[i][1], usable[i], scale);
     });
     alignment.refine(views);
   }
