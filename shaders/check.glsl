@@ -170,52 +170,79 @@ FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   return sample_image(CONTEXT source, PARAMETERS.cameras[source].size, texel_at(CONTEXT position));
 }
 
-// Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the
-// reasons. With CHECK_FOR_VOTE the source that tells most (agreeing_source()) and what it shows of the point stand for the
-// difference and the confidence, which cost more and are not asked for then.
-FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+// A pixel's plane beside those of the sources and of the surroundings.
+struct Comparison {
+  vec3 ray;
+  vec4 held;
+  float w;           // its inverse distance
+  vec2 difference;   // relative, and displacement (px), from the nearest of the sources' own planes
+  vec2 support;      // support_of_surroundings()
+  int reasons;
+};
+
+// False where the pixel has no plane; `difference` and `reasons` say so, too.
+FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
-  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
-  vec3 m = vec3(held.x, held.y, held.z);
-  vec2 difference = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
-  float confidence = 0.0f;
-  int reasons = 0;
+  c.ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  c.held = hypothesis_at(CONTEXT REFERENCE, pixel);
+  vec3 m = vec3(c.held.x, c.held.y, c.held.z);
+  c.w = dot(m, c.ray);
+  c.difference = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
+  c.support = vec2(0.0f, 0.0f);
+  c.reasons = 0;
   if (!is_usable(CONTEXT pixel, usable_ray)) {
-    reasons = REASON_NO_RAY;
-  } else if (held.w >= INVALID_COST) {
-    reasons = REASON_NO_OVERLAP;
-  } else {
-    float w = dot(m, ray);
-    float speed = speed_in_sources(CONTEXT pixel, ray, w);
-    for (int i = 0; i < SOURCE_COUNT; ++i) {
-      vec2 candidate = difference_from_source(CONTEXT source_at(CONTEXT i), pixel, ray, m);
-      if (candidate.y < difference.y) difference = candidate;
-    }
-    vec4 limits = PARAMETERS.check_limits;
-    bool for_vote = (PASS.candidates & CHECK_FOR_VOTE) != 0u;
-    vec2 support = support_of_surroundings(CONTEXT pixel, ray, w, speed);
-    bool unchecked = difference.y >= UNKNOWN_DIFFERENCE;
-    float least_variance = PARAMETERS.patch_limits.x;
-    if (least_variance > 0.0f && reference_variance(CONTEXT pixel) < least_variance) reasons |= REASON_NO_TEXTURE;
-    if (held.w > limits.z) reasons |= REASON_HIGH_COST;
-    if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) reasons |= REASON_LOW_PARALLAX;
-    if (w < PARAMETERS.patch_limits.z * length(m)) reasons |= REASON_TILT;
-    if (unchecked) {
-      reasons |= REASON_UNCHECKED;
-    } else if (difference.x > limits.x || difference.y > limits.y) {
-      reasons |= REASON_INCONSISTENT;
-    }
-    if (support.x < PARAMETERS.patch_limits.w) reasons |= REASON_SPECKLE;
-    if (for_vote) {
-      vec2 velocity;
-      int source = agreeing_source(CONTEXT pixel, ray, m, velocity);
-      difference.x = float(source);
-      confidence = intensity_in_source(CONTEXT source, ray, w);
-    } else {
-      float structure = structure_of_surroundings(CONTEXT pixel, reference_noise(CONTEXT pixel));
-      confidence = confidence_of(unchecked ? UNCHECKED_DISPLACEMENT : difference.y, support.x, held.w, support.y, structure);
-    }
+    c.reasons = REASON_NO_RAY;
+    return false;
   }
-  store_check(CONTEXT REFERENCE, pixel, vec4(difference.x, difference.y, confidence, float(reasons)));
+  if (c.held.w >= INVALID_COST) {
+    c.reasons = REASON_NO_OVERLAP;
+    return false;
+  }
+  float speed = speed_in_sources(CONTEXT pixel, c.ray, c.w);
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    vec2 candidate = difference_from_source(CONTEXT source_at(CONTEXT i), pixel, c.ray, m);
+    if (candidate.y < c.difference.y) c.difference = candidate;
+  }
+  c.support = support_of_surroundings(CONTEXT pixel, c.ray, c.w, speed);
+  vec4 limits = PARAMETERS.check_limits;
+  float least_variance = PARAMETERS.patch_limits.x;
+  if (least_variance > 0.0f && reference_variance(CONTEXT pixel) < least_variance) c.reasons |= REASON_NO_TEXTURE;
+  if (c.held.w > limits.z) c.reasons |= REASON_HIGH_COST;
+  if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) c.reasons |= REASON_LOW_PARALLAX;
+  if (c.w < PARAMETERS.patch_limits.z * length(m)) c.reasons |= REASON_TILT;
+  if (c.difference.y >= UNKNOWN_DIFFERENCE) {
+    c.reasons |= REASON_UNCHECKED;
+  } else if (c.difference.x > limits.x || c.difference.y > limits.y) {
+    c.reasons |= REASON_INCONSISTENT;
+  }
+  if (c.support.x < PARAMETERS.patch_limits.w) c.reasons |= REASON_SPECKLE;
+  return true;
+}
+
+// Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the
+// reasons.
+FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  Comparison c;
+  float confidence = 0.0f;
+  if (compare_with_others(CONTEXT pixel, c)) {
+    float structure = structure_of_surroundings(CONTEXT pixel, reference_noise(CONTEXT pixel));
+    float displacement = c.difference.y >= UNKNOWN_DIFFERENCE ? UNCHECKED_DISPLACEMENT : c.difference.y;
+    confidence = confidence_of(displacement, c.support.x, c.held.w, c.support.y, structure);
+  }
+  store_check(CONTEXT REFERENCE, pixel, vec4(c.difference.x, c.difference.y, confidence, float(c.reasons)));
+}
+
+// Stores what a vote asks for: the source that tells most (agreeing_source()), the displacement, what that source shows of
+// the point, and the reasons.
+FN void check_for_vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  Comparison c;
+  float source = 0.0f;
+  float intensity = MASKED_INTENSITY;
+  if (compare_with_others(CONTEXT pixel, c)) {
+    vec2 velocity;
+    int agreeing = agreeing_source(CONTEXT pixel, c.ray, vec3(c.held.x, c.held.y, c.held.z), velocity);
+    source = float(agreeing);
+    intensity = intensity_in_source(CONTEXT agreeing, c.ray, c.w);
+  }
+  store_check(CONTEXT REFERENCE, pixel, vec4(source, c.difference.y, intensity, float(c.reasons)));
 }

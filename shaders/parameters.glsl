@@ -86,10 +86,9 @@ FN int samples_of_patch(int radius, int pattern) {
 #define CANDIDATE_SOURCE_PLANE 13
 
 // Bits of PassParameters.candidates of other kernels: see regress_plane(), adopt_pixel(),
-// check_pixel() and adopt_fill_pixel(), where it stands beside the reasons.
+// and adopt_fill_pixel(), where it stands beside the reasons.
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
-#define CHECK_FOR_VOTE 1u
 #define FILL_WITH_MATCHES (2u * REASON_FILLED)
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
@@ -136,7 +135,7 @@ struct PassParameters {
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last, which a view that is lower than others does not reach
   uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS; adopting:
-                    // HELD_UNSEEN; checking: CHECK_FOR_VOTE; filling: reasons not to fill, FILL_WITH_MATCHES
+                    // HELD_UNSEEN; filling: reasons not to fill, FILL_WITH_MATCHES
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels

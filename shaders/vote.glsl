@@ -48,7 +48,7 @@ FN float remoteness_of_voter(CONTEXT_ARGUMENT ivec2 q, int dx, int dy, float fal
 }
 
 // How many times brighter the reference is than the source around the pixel, for exposures and vignetting differ: from
-// the pixels that passed check_pixel() for this vote, which has left what the source shows of them.
+// the pixels that passed check_for_vote_pixel(), which has left what the source shows of them.
 FN float gain_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float gain = 1.0f;

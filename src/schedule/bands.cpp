@@ -46,6 +46,7 @@ long long estimated_work(const Dispatch& dispatch, const KernelConstants& consta
       return work_of_voters(NORMAL_VOTE_RADIUS, NORMAL_VOTE_STEP, NORMAL_VOTE_STEP) *
              dispatch.pixels;
     case Kernel::check:
+    case Kernel::check_for_vote:
       return dispatch.samples + of_windows;
     case Kernel::fill:
       return of_windows + pixels_on_eight_rays(dispatch) * dispatch.pixels;

@@ -170,7 +170,7 @@ class Builder {
   }
 
   Schedule finished() {
-    check(0);
+    add(Kernel::check, pass_of(views_of(0)), views_of(0), 0);
     if (options_.ambiguity_margin > 0) find_ambiguity();
     fill(options_.fill_radius, reason_no_ray);
     return std::move(schedule_);
@@ -482,13 +482,6 @@ class Builder {
     add(Kernel::adopt, pass, views_of(0), 1);
   }
 
-  /// `how`: CHECK_FOR_VOTE, which samples one source once, or 0.
-  void check(unsigned how) {
-    kernel::PassParameters pass = pass_of(views_of(0));
-    pass.candidates = how;
-    add_with_samples(Kernel::check, pass, views_of(0), how == CHECK_FOR_VOTE ? 1 : 0);
-  }
-
   void find_ambiguity() {
     kernel::PassParameters pass = pass_of(views_of(0));
     pass.places = 6;
@@ -509,7 +502,8 @@ class Builder {
   /// Lets pixels that fail the checks take the planes around them, and then the elected ones.
   void repair_and_vote() {
     if (options_.repair_radius == 0 && options_.vote_radius == 0) return;
-    check(CHECK_FOR_VOTE);
+    // Samples one source once.
+    add_with_samples(Kernel::check_for_vote, pass_of(views_of(0)), views_of(0), 1);
     fill(options_.repair_radius, reason_no_ray | reason_no_overlap | FILL_WITH_MATCHES);
     vote();
   }

@@ -135,7 +135,9 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
     case Kernel::transfer_gather:
       return {seen | winner | plane, texels, plane};
     case Kernel::check:
-      return {seen | plane, dispatch.samples > 0 ? plane | texels : plane, checks};
+      return {seen | plane, plane, checks};
+    case Kernel::check_for_vote:
+      return {seen | plane, plane | texels, checks};
     case Kernel::ambiguity:
       return {seen | plane | checks, texels, checks};
     case Kernel::interpolate:
