@@ -35,7 +35,7 @@ KernelTable specialised_kernels(const KernelConstants& c) {
 }  // namespace
 
 LaunchGrid launch_grid(int width, int rows, int colour) {
-  const int columns = colour < 0 ? width : (width + 1) / 2;
+  const int columns = columns_of(width, colour);
   return {static_cast<unsigned>((columns + block_width - 1) / block_width),
           static_cast<unsigned>((rows + block_height - 1) / block_height)};
 }

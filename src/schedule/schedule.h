@@ -51,6 +51,9 @@ struct Dispatch {
   long long samples = 0;  ///< patch samples at full windows, for splitting and progress
 };
 
+/// How many pixels of a row are launched: every other one for one colour of the checkerboard.
+inline int columns_of(int width, int colour) { return colour < 0 ? width : (width + 1) / 2; }
+
 struct Schedule {
   KernelConstants constants;
   kernel::MatchParameters parameters{};
@@ -67,7 +70,7 @@ Schedule make_schedule(const Rig& rig, const Options& options);
 /// frame, with the same constants and views; set_motion() completes it. Throws as make_schedule().
 Schedule make_warm_schedule(const Rig& rig, const Options& options);
 
-/// Sets how the rig moved since the previous frame, and which frame this is since a cold one; the
+/// Sets how the rig moved since the previous frame, and which frame of its sequence this is; the
 /// dispatches stay the same. `now_from_previous`: X now = T X then, in the rig's frame (metres).
 void set_motion(Schedule& schedule, const Rig& rig, const Eigen::Isometry3d& now_from_previous,
                 int frame);

@@ -92,8 +92,7 @@ Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& consta
                      VkPipelineCache cache)
     : constants_{constants, 8, sampled ? 16u : 8u},
       sampled_(sampled),
-      half_precision_(constants.filter == static_cast<int>(Filter::device) &&
-                      context.filters_half_precision()) {
+      half_precision_(filters() && context.filters_half_precision()) {
   make_layouts(context);
   for (int i = 0; i < kernel_count; ++i) {
     const Kernel kernel = static_cast<Kernel>(i);

@@ -49,6 +49,8 @@ class Pipelines {
             VkPipelineCache cache);
 
   bool sampled() const { return sampled_; }
+  /// Whether texture units filter.
+  bool filters() const { return constants_.kernel.filter == static_cast<int>(Filter::device); }
   /// How many workgroups cover so many pixels of a row, or of a column.
   std::uint32_t workgroups_of_row(int pixels) const;
   std::uint32_t workgroups_of_column(int pixels) const;

@@ -39,12 +39,7 @@ Submission::Submission(const VulkanContext& context, VkCommandPool pool,
   queries_ = context.own(queries, vk.vkDestroyQueryPool);
 }
 
-Submission::~Submission() {
-  // Nothing may be destroyed while the device uses it; a lost device counts as finished.
-  if (!in_flight_) return;
-  const VkFence fence = fence_.get();
-  context_.vk().vkWaitForFences(context_.device(), 1, &fence, VK_TRUE, no_timeout);
-}
+Submission::~Submission() { finish(); }
 
 VkCommandBuffer Submission::begin() {
   wait();
@@ -79,12 +74,15 @@ void Submission::submit() {
   in_flight_ = true;
 }
 
-void Submission::wait() {
-  if (!in_flight_) return;
-  in_flight_ = false;
+void Submission::wait() { context_.check(finish(), "finish its commands"); }
+
+VkResult Submission::finish() {
+  if (!in_flight_) return VK_SUCCESS;
   const VkFence fence = fence_.get();
-  context_.check(context_.vk().vkWaitForFences(context_.device(), 1, &fence, VK_TRUE, no_timeout),
-                 "finish its commands");
+  const VkResult result =
+      context_.vk().vkWaitForFences(context_.device(), 1, &fence, VK_TRUE, no_timeout);
+  if (result == VK_SUCCESS || result == VK_ERROR_DEVICE_LOST) in_flight_ = false;
+  return result;
 }
 
 std::vector<double> Submission::elapsed() const {

@@ -26,6 +26,8 @@ class Submission {
   bool in_flight() const { return in_flight_; }
   /// Waits for the end, if in flight.
   void wait();
+  /// Likewise, for whoever must not throw; a lost device counts as finished.
+  VkResult finish();
   /// Milliseconds between each two consecutive timestamps of the finished submission; empty without
   /// a clock.
   std::vector<double> elapsed() const;

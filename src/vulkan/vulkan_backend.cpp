@@ -69,9 +69,9 @@ Pipelines make_pipelines(const VulkanContext& context, KernelConstants constants
   return Pipelines(context, constants, sampled, cache);
 }
 
-/// Exact filtering gathers, which takes no notice of the sampler's filter.
-Handle<VkSampler> make_sampler(const VulkanContext& context) {
-  const VkFilter filter = context.filters_intensities() ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
+/// Where `filters` is false, texels may be of a format that the device filters in no way.
+Handle<VkSampler> make_sampler(const VulkanContext& context, bool filters) {
+  const VkFilter filter = filters ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
   VkSamplerCreateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO;
   info.magFilter = filter;
@@ -110,7 +110,7 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
                                 cache.get())),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
-      sampler_(make_sampler(context)),
+      sampler_(make_sampler(context, pipelines_.filters())),
       command_pool_(make_command_pool(context)) {
   cache.save();
   make_images(context);
@@ -389,7 +389,7 @@ void VulkanBackend::record_parameters(VkCommandBuffer commands, const Schedule& 
 
 void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) const {
   const DeviceFunctions& vk = context_.vk();
-  // Bands of one dispatch would need none, but synchronization validation sees whole images only,
+  // Bands of one dispatch would need none, but synchronization validation sees whole buffers only,
   // and draining the device costs nothing beside a band.
   record_barrier(commands);
   vk.vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE,
@@ -402,8 +402,7 @@ void VulkanBackend::record_band(VkCommandBuffer commands, const Band& band) cons
   pass.last_row = band.last_row;
   vk.vkCmdPushConstants(commands, pipelines_.layout(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof pass,
                         &pass);
-  const int width = band.dispatch->width;
-  const int columns = pass.colour < 0 ? width : (width + 1) / 2;
+  const int columns = columns_of(band.dispatch->width, pass.colour);
   vk.vkCmdDispatch(commands, pipelines_.workgroups_of_row(columns),
                    pipelines_.workgroups_of_column(band.last_row - band.first_row),
                    static_cast<std::uint32_t>(band.dispatch->views));
@@ -423,6 +422,15 @@ void VulkanBackend::record_dispatches(std::span<const VkCommandBuffer> commands,
 
 /// Feeds the two submissions in turn and accounts for what they have finished.
 struct VulkanBackend::Run {
+  Run(VulkanBackend& of, const Schedule& runs, const Matcher::Progress& reports_to)
+      : backend(of), schedule(runs), progress(runs, reports_to) {}
+  /// What is left of an aborted run must not write what the next one uploads.
+  ~Run() {
+    for (const auto& submission : backend.submissions_) submission->finish();
+  }
+  Run(const Run&) = delete;
+  Run& operator=(const Run&) = delete;
+
   /// Consecutive bands of one kernel: what lies between two timestamps.
   struct Stretch {
     Kernel kernel = Kernel::initialise;
@@ -486,7 +494,7 @@ void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progr
   times_.clear();
   milliseconds_ = 0;
   const std::vector<Band> bands = split_into_bands(schedule, max_samples_);
-  Run run{*this, schedule, ScheduleProgress(schedule, progress)};
+  Run run(*this, schedule, progress);
   bool first = true;
   for (const auto group : group_for_submission(bands, max_samples_, max_bands_per_submission)) {
     run.finish();

@@ -25,7 +25,7 @@ struct VulkanTuning {
   std::optional<bool> sampled = std::nullopt;
 };
 
-/// Images and kernels for matches of fixed sizes on a Vulkan device. Not thread-safe; the context
+/// Memory and kernels for matches of fixed sizes on a Vulkan device. Not thread-safe; the context
 /// must outlive it. Everything but record_…() submits to the context's queue and waits for its
 /// own fence.
 class VulkanBackend final : public Backend {
@@ -40,8 +40,7 @@ class VulkanBackend final : public Backend {
   /// queue of the context's family; submits nothing and waits for nothing. The parameters come
   /// first, in the first of them; further kernels may follow, and then the dispatches in shares of
   /// about the same work. The commands wait for earlier compute and transfer commands of the queue;
-  /// a caller that reads the results puts a barrier after them (from compute shader writes; all
-  /// images are in VK_IMAGE_LAYOUT_GENERAL).
+  /// a caller that reads the results puts a barrier after them (from compute shader writes).
   void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
   void record_dispatches(std::span<const VkCommandBuffer> commands, const Schedule& schedule) const;
   /// Lets a kernel see what earlier ones wrote.
