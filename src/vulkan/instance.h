@@ -31,7 +31,6 @@ class VulkanInstance {
   VulkanInstance(const VulkanInstance&) = delete;
   VulkanInstance& operator=(const VulkanInstance&) = delete;
 
-  PFN_vkGetInstanceProcAddr get_instance_proc_addr() const { return get_; }
   VkInstance handle() const { return instance_; }
   const InstanceFunctions& functions() const { return functions_; }
   /// In the driver's order.

@@ -136,7 +136,9 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
            ", but 1.1 is needed; update the driver.";
   }
   if (!compute_queue_family(vk, device)) return "it has no compute queue; use another device.";
-  if (!has_format(vk, device, VK_FORMAT_R32G32B32A32_SFLOAT,
+  const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  if (in_software &&
+      !has_format(vk, device, VK_FORMAT_R32G32B32A32_SFLOAT,
                   VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
     return "it lacks storage images of four 32-bit floats; use another device.";
   }
@@ -156,8 +158,8 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   if (limits.maxComputeWorkGroupInvocations < 128) {
     return too_low("maxComputeWorkGroupInvocations", 128, limits.maxComputeWorkGroupInvocations);
   }
-  // With those of conversions; software devices bind intensities and maps as storage images.
-  const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
+  // With those of conversions; software devices bind intensities and maps as texel buffers, which
+  // count as images.
   const std::uint32_t buffers = in_software ? 3 : 8;
   const std::uint32_t images = in_software ? 6 : 1;
   if (limits.maxPerStageDescriptorStorageBuffers < buffers) {
