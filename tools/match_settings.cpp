@@ -185,9 +185,6 @@ void MatchSettings::require_effect(const Options& options) const {
   for (const Parameter& parameter : given_) {
     if (parameter.search && parameter.search != options.search) refuse(parameter.name);
   }
-  if (options.search == SearchMethod::pyramid && options.propagation == Propagation::raster) {
-    refuse("--propagation raster");
-  }
 }
 
 Options MatchSettings::options() const {

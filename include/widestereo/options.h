@@ -147,7 +147,7 @@ struct Options {
   double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2
   /// Pixels between min_distance and max_distance in the source view, 0..10000.
   double min_parallax = 0.5;
-  double max_tilt = 85;  ///< degrees between the normal and the viewing ray, 0..90
+  double max_tilt = 85;  ///< degrees between normal and viewing ray, 0..90; the search keeps to it
   /// Smallest share of the planes around (40 pixels wide) that put the pixel's point within a
   /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;

@@ -88,6 +88,12 @@ void validate(const Options& o) {
   require_between(o.first_iterations, 1, 100000, "first iterations");
   require_between(o.second_iterations, 0, 100000, "second iterations");
   require_between(o.refinements, 0, 16, "refinements");
+  if (o.propagation == Propagation::raster && o.search == SearchMethod::pyramid) {
+    throw Error(
+        "Raster-order propagation belongs to the random search; choose checkerboard propagation, "
+        "or "
+        "the preset \"paper\".");
+  }
   require_between(o.best_sources, 1, 8, "best sources");
   require_between(o.weight_scale, 0, 10000, "weight scale");
   require_between(o.levels, 1, 4, "levels");

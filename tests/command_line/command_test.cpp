@@ -290,8 +290,8 @@ TEST_F(RefusedWords, LimitsAreShort) {
 TEST_F(RefusedWords, OptionsHaveAnEffect) {
   const std::string depth = "depth " + file("left.png") + " " + file("right.png") + " -c " +
                             file("calib.yaml") + " -o " + file("out") + " --device cpu ";
-  for (const char* option :
-       {"--propagation raster", "--iterations 3", "--second-iterations 3", "--refinements 3"}) {
+  expect_error(depth + "--preset fast --propagation raster", "belongs to the random search");
+  for (const char* option : {"--iterations 3", "--second-iterations 3", "--refinements 3"}) {
     expect_error(depth + option, std::string(option).substr(0, std::string(option).find(' ')));
     expect_error(depth + "--preset fast " + option, "has no effect with the preset fast");
   }

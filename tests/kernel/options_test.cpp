@@ -28,5 +28,13 @@ TEST(Options, NumbersThatAreNotFiniteAreNamed) {
   EXPECT_THAT(error(&Options::max_distance, infinity), HasSubstr("to infinity m is not usable"));
 }
 
+TEST(Options, RasterOrderBelongsToTheRandomSearch) {
+  Options options = Options::preset_named("fast");
+  options.propagation = Propagation::raster;
+  EXPECT_THAT(error_of([&] { validate(options); }), HasSubstr("checkerboard propagation"));
+  options.search = SearchMethod::random;
+  EXPECT_EQ(error_of([&] { validate(options); }), "");
+}
+
 }  // namespace
 }  // namespace widestereo::test
