@@ -8,7 +8,7 @@
 namespace widestereo {
 namespace {
 
-constexpr long long rows_of_workgroup = 8;
+constexpr long long rows_of_workgroup = 16;  // a multiple of every back end's
 
 /// Samples of the search that take as long as a neighbour of a regression, or one whose plane votes
 /// for the candidates, by their operations; fewer do on software Vulkan.

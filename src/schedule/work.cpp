@@ -148,8 +148,10 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
       return {seen, texels, plane};
     case Kernel::upsample:
       return {seen | quarter_of_planes, texels, plane};
-    case Kernel::search:
-      return {seen | plane, texels, half_of_planes};
+    case Kernel::search: {
+      const bool asks_sources = (dispatch.pass.candidates & 1u << CANDIDATE_SOURCE_PLANE) != 0;
+      return {seen | plane, asks_sources ? texels | plane : texels, half_of_planes};
+    }
     case Kernel::measure:
       return {seen | texels | plane, plane, checks};
     case Kernel::subpixel:
