@@ -20,7 +20,9 @@ struct ViewMemory {
   cv::Mat_<cv::Vec4f> priors;
 
   void set_size(cv::Size size, const KernelConstants& constants) {
-    for (cv::Mat_<cv::Vec4f>* map : {&rays, &hypotheses, &checks, &priors}) map->create(size);
+    for (cv::Mat_<cv::Vec4f>* map : {&rays, &hypotheses, &checks, &priors}) {
+      *map = cv::Mat_<cv::Vec4f>(size, cv::Vec4f());
+    }
     intensities = cv::Mat_<float>(with_apron(size), MASKED_INTENSITY);
     texels = cv::Mat_<float>(size_of_texels(size, constants), MASKED_INTENSITY);
   }

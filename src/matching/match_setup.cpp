@@ -23,12 +23,19 @@ MatchSetup::MatchSetup(const Rig& rig, const Options& options, const DeviceInfo&
   }
   for (const View& view : schedule.views) {
     sizes.emplace_back(view.camera.width, view.camera.height);
-    rays.push_back(ray_image(view.camera, view.mask));
   }
 }
 
-void MatchSetup::set_rays(Backend& backend) const {
-  for (std::size_t i = 0; i < rays.size(); ++i) backend.set_rays(static_cast<int>(i), rays[i]);
+std::vector<cv::Mat> MatchSetup::set_rays(Backend& backend) const {
+  const auto views_of_rig = static_cast<std::size_t>(schedule.constants.source_count) + 1;
+  std::vector<cv::Mat> of_rig;
+  for (std::size_t i = 0; i < schedule.views.size(); ++i) {
+    const View& view = schedule.views[i];
+    const cv::Mat rays = ray_image(view.camera, view.mask);
+    backend.set_rays(static_cast<int>(i), rays);
+    if (i < views_of_rig) of_rig.push_back(rays);
+  }
+  return of_rig;
 }
 
 }  // namespace widestereo

@@ -13,12 +13,12 @@ namespace widestereo {
 struct MatchSetup {
   /// Throws Error when rig or options are invalid or do not suit a device of this kind and type.
   MatchSetup(const Rig& rig, const Options& options, const DeviceInfo& device);
-  void set_rays(Backend& backend) const;
+  /// Hands all viewing rays to the back end; returns those of the rig's views, CV_32FC4.
+  std::vector<cv::Mat> set_rays(Backend& backend) const;
 
   Schedule schedule;       ///< of a frame by itself
   Schedule warm_schedule;  ///< of one that starts from the previous one; set_motion() completes it
   std::vector<cv::Size> sizes;  ///< of each view at each level
-  std::vector<cv::Mat> rays;    ///< likewise
 };
 
 }  // namespace widestereo

@@ -34,16 +34,18 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
   result.distance = cv::Mat::zeros(hypotheses.size(), CV_32FC1);
   result.normals = cv::Mat::zeros(hypotheses.size(), CV_32FC3);
   cv::extractChannel(hypotheses, result.cost, 3);
-  for (int y = 0; y < hypotheses.rows; ++y) {
-    for (int x = 0; x < hypotheses.cols; ++x) {
-      const kernel::vec4 hypothesis = to_vec4(hypotheses(y, x));
-      const float distance = kernel::plane_distance(hypothesis, to_vec4(rays(y, x)));
-      if (!(distance > 0)) continue;
-      const kernel::vec3 normal = kernel::plane_normal(hypothesis);
-      result.distance.at<float>(y, x) = distance;
-      result.normals.at<cv::Vec3f>(y, x) = {normal.x, normal.y, normal.z};
+  cv::parallel_for_(cv::Range(0, hypotheses.rows), [&](const cv::Range& rows) {
+    for (int y = rows.start; y < rows.end; ++y) {
+      for (int x = 0; x < hypotheses.cols; ++x) {
+        const kernel::vec4 hypothesis = to_vec4(hypotheses(y, x));
+        const float distance = kernel::plane_distance(hypothesis, to_vec4(rays(y, x)));
+        if (!(distance > 0)) continue;
+        const kernel::vec3 normal = kernel::plane_normal(hypothesis);
+        result.distance.at<float>(y, x) = distance;
+        result.normals.at<cv::Vec3f>(y, x) = {normal.x, normal.y, normal.z};
+      }
     }
-  }
+  });
 }
 
 void require_overlap(const std::vector<ViewResult>& views) {
@@ -84,9 +86,8 @@ class Matcher::Implementation {
   Implementation(Device& device, const Rig& rig, const Options& options)
       : rig_(rig),
         setup_(rig, options, device.info()),
-        backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)) {
-    setup_.set_rays(*backend_);
-  }
+        backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)),
+        rays_(setup_.set_rays(*backend_)) {}
 
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress) {
     return run(setup_.schedule, images, progress);
@@ -126,7 +127,7 @@ class Matcher::Implementation {
     }
     std::vector<cv::Mat> intensities;
     for (std::size_t i = 0; i < images.size(); ++i) {
-      intensities.push_back(masked_intensities(images[i], rig_.views[i], setup_.rays[i]));
+      intensities.push_back(masked_intensities(images[i], rig_.views[i], rays_[i]));
     }
     // What is refused is refused above, and leaves the planes of the last match in place.
     holds_planes_ = false;
@@ -142,7 +143,7 @@ class Matcher::Implementation {
     for (std::size_t i = 0; i < images.size(); ++i) {
       ViewResult& view = result.views.emplace_back();
       view.hypotheses = backend_->hypotheses(static_cast<int>(i));
-      unpack_hypotheses(setup_.rays[i], view);
+      unpack_hypotheses(rays_[i], view);
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
     }
     require_overlap(result.views);
@@ -160,6 +161,7 @@ class Matcher::Implementation {
   Rig rig_;
   MatchSetup setup_;
   std::unique_ptr<Backend> backend_;
+  std::vector<cv::Mat> rays_;  // of the rig's views
   bool holds_planes_ = false;  // of a frame that was matched to the end
 };
 
