@@ -2,7 +2,7 @@
 // What is known about a pixel once all views have planes: agreement with the sources' own planes and with the
 // surroundings, texture, parallax and tilt, summed up as reasons for rejection and a confidence.
 
-// The surroundings of a pixel: a sparse grid of this radius and step.
+// The surroundings of a pixel: a sparse grid of this radius and step, which leaves out the pixel itself.
 #define SUPPORT_RADIUS 20
 #define SUPPORT_STEP 8
 // Displacement (source pixels) up to which another plane supports the pixel's own.
@@ -139,7 +139,7 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
     for (int dx = grid.x; dx <= grid.z; dx += SUPPORT_STEP) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
       // No branches, so that planes are loaded ahead.
-      float counts = plane.w < INVALID_COST && (dx != 0 || dy != 0) ? 1.0f : 0.0f;
+      float counts = plane.w < INVALID_COST ? 1.0f : 0.0f;
       planes += counts;
       float correlation = max(1.0f - plane.w, 0.0f);
       evidence += counts * (correlation * correlation);
@@ -174,9 +174,9 @@ FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
 struct Comparison {
   vec3 ray;
   vec4 held;
-  float w;           // its inverse distance
-  vec2 difference;   // relative, and displacement (px), from the nearest of the sources' own planes
-  vec2 support;      // support_of_surroundings()
+  float w;          // its inverse distance
+  vec2 difference;  // relative, and displacement (px), from the nearest of the sources' own planes
+  vec2 support;     // support_of_surroundings()
   int reasons;
 };
 

@@ -116,7 +116,7 @@ struct MatchParameters {
   ivec4 search;       // distance sampling, refinements, best sources; unused
   vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
                       // preference for far planes
-  ivec4 frame;        // number of the frame since the last one that was started anew; unused
+  ivec4 frame;        // number of the frame in its sequence, for other random draws; unused
   CameraParameters cameras[MAX_VIEWS];
   // Of images, at all levels alike; [reference * MAX_IMAGES + source]: source from reference; of an image with itself:
   // now from the previous frame
@@ -128,7 +128,7 @@ struct PassParameters {
   int reference;   // view whose pixels are updated; of a launch over several views the first, others follow
   int first_view;  // of the level: its views follow each other; all but the reference are sources
   int other;       // the one view that a transfer or a change of level reads from, likewise
-  int iteration;   // counts over the whole schedule of this view
+  int iteration;   // tells random draws apart; of regressions and their votes it counts over the whole schedule
   int colour;      // 0, 1: checkerboard; -1: all pixels
   int neighbours;  // bits: left, right, up, down
   uint seed;
