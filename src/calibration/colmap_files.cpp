@@ -9,6 +9,7 @@
 #include <span>
 #include <sstream>
 
+#include "text/byte_order_mark.h"
 #include "widestereo/error.h"
 
 namespace widestereo::calibration {
@@ -48,7 +49,9 @@ Eigen::Isometry3d pose_of(std::span<const double, 7> v, const std::string& where
 /// A .txt file of a model.
 class TextFile {
  public:
-  explicit TextFile(const fs::path& path) : path_(path), file_(open(path)) {}
+  explicit TextFile(const fs::path& path) : path_(path), file_(open(path)) {
+    skip_byte_order_mark(file_);
+  }
 
   /// The next line that is neither blank nor a comment.
   bool next_record() {

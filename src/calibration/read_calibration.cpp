@@ -16,6 +16,7 @@
 #include "calibration/orb_slam.h"
 #include "calibration/woodscape.h"
 #include "geometry/validation.h"
+#include "text/byte_order_mark.h"
 #include "widestereo/error.h"
 #include "widestereo/sfm_model.h"
 
@@ -120,6 +121,7 @@ Document load(const std::filesystem::path& path) {
     throw Error(path.string() + " is too large for a calibration file (16 MiB).");
   }
   std::ifstream file(path, std::ios::binary);
+  skip_byte_order_mark(file);
   std::stringstream text;
   text << file.rdbuf();
   if (!file) throw Error("Cannot read " + path.string() + "; check its permissions.");

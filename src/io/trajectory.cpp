@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "text/byte_order_mark.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/sequence.h"
@@ -113,6 +114,7 @@ class PoseLine {
 Trajectory read_trajectory(const std::filesystem::path& path) {
   std::ifstream file(path);
   if (!file) throw Error("Cannot read the poses " + path.string() + "; check the path.");
+  skip_byte_order_mark(file);
   Trajectory trajectory;
   std::optional<PoseLine> layout;
   std::string header, line;

@@ -227,6 +227,12 @@ TEST(Kalibr, ReadsPosesThatOnlyTheImuGives) {
       1e-9);
 }
 
+TEST(Basalt, MayBeginWithAByteOrderMark) {
+  const TemporaryFolder folder;
+  const auto path = folder.write("calib.json", "\xef\xbb\xbf" + std::string(basalt_text));
+  EXPECT_EQ(read_calibration(path).format, CalibrationFormat::basalt);
+}
+
 TEST(Basalt, ReadsWhereTheImuIs) {
   const TemporaryFolder folder;
   EXPECT_FALSE(

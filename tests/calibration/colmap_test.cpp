@@ -144,6 +144,12 @@ TEST_F(Colmap, ReadsTextInAnyLocale) {
   EXPECT_EQ(view.camera.k1, -0.1);
 }
 
+TEST_F(Colmap, TextsMayBeginWithAByteOrderMark) {
+  folder_.write("cameras.txt", "\xef\xbb\xbf" + std::string(cameras_text));
+  folder_.write("images.txt", images_text);
+  EXPECT_EQ(SfmModel(folder_.path()).names().size(), 3u);
+}
+
 TEST_F(Colmap, ReadsBinaryFilesAsText) {
   write_text();
   const Rig text = read().rig;
