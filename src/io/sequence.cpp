@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 
+#include "text/byte_order_mark.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -57,7 +58,9 @@ Images images_in(const fs::path& folder) {
   for (fs::directory_iterator entry(folder, error), end; entry != end; entry.increment(error)) {
     std::error_code ignored;  // a link to nothing is no image
     const fs::path& path = entry->path();
-    if (!entry->is_regular_file(ignored) || !is_image(path)) continue;
+    // Such names are of files that macOS keeps attributes in.
+    const bool holds_attributes = path.filename().string().starts_with("._");
+    if (holds_attributes || !entry->is_regular_file(ignored) || !is_image(path)) continue;
     const auto [place, is_new] = images.of_frames.emplace(path.stem().string(), path);
     if (!is_new) {
       throw Error("The frame " + place->first + " has two images, " + place->second.string() +
@@ -76,6 +79,7 @@ Images images_in(const fs::path& folder) {
 Images images_listed_in(const fs::path& list) {
   std::ifstream file(list);
   if (!file) throw Error("Cannot read " + list.string() + "; check its permissions.");
+  skip_byte_order_mark(file);
   Images images;
   images.listed = true;
   std::map<std::string, int> lines;
@@ -116,6 +120,22 @@ fs::file_type type_of(const fs::path& path) {
 
 bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::directory; }
 
+/// Leaves out what a list names and is not there.
+void leave_out_missing(Images& images) {
+  std::erase_if(images.of_frames, [](const auto& image) {
+    return type_of(image.second) == fs::file_type::not_found;
+  });
+}
+
+/// Before any frame is matched, for that may be hours before the missing one's turn.
+void require_listed(const Images& images) {
+  for (const auto& [time, path] : images.of_frames) {
+    if (type_of(path) != fs::file_type::not_found) continue;
+    throw Error("The frame " + time + " has no image " + path.string() +
+                ", which data.csv lists; add it, or leave such frames out (--skip-incomplete).");
+  }
+}
+
 /// Of one camera, listed or not.
 Images images_of(const fs::path& folder, bool skip_missing) {
   const fs::path list = folder / "data.csv";
@@ -123,11 +143,8 @@ Images images_of(const fs::path& folder, bool skip_missing) {
                   : is_folder(folder / "data")            ? images_in(folder / "data")
                                                           : images_in(folder);
   images.folder = folder;
-  if (images.listed && skip_missing) {
-    std::erase_if(images.of_frames, [](const auto& image) {
-      return type_of(image.second) == fs::file_type::not_found;
-    });
-  }
+  if (images.listed && skip_missing) leave_out_missing(images);
+  if (images.listed && !skip_missing) require_listed(images);
   return images;
 }
 

@@ -54,6 +54,10 @@ TEST_F(Sequences, EurocListsAreMatchedByTime) {
   const std::string header = "#timestamp [ns],filename\r\n";
   add("mav0/cam0/data.csv", header + "1403636579763555584,a.png\r\n1403636579813555456,b.png\r\n");
   add("mav0/cam1/data.csv", header + "1403636579813555456, d.png\n1403636579763555584,c.png\n");
+  for (const char* image :
+       {"cam0/data/a.png", "cam0/data/b.png", "cam1/data/c.png", "cam1/data/d.png"}) {
+    add("mav0/" + std::string(image));
+  }
   const auto frames = read_sequence(folder_.path(), {0, 1});
   ASSERT_EQ(names(frames), (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(frames[1].images[1], folder_ / "mav0/cam1/data/d.png");
@@ -88,6 +92,7 @@ TEST_F(Sequences, FoldersOfCamerasMayHaveAnyNames) {
 
 TEST_F(Sequences, ListsAreInNanosecondsHoweverFewDigitsTheyHave) {
   add("mav0/cam0/data.csv", "50000000,a.png\n");
+  add("mav0/cam0/data/a.png");
   const auto frames = read_sequence(folder_.path(), {0});
   ASSERT_EQ(frames.size(), 1u);
   EXPECT_EQ(frames[0].nanoseconds, 50000000);
@@ -141,7 +146,9 @@ TEST_F(Sequences, ListedFilesThatAreMissingMakeFramesIncomplete) {
     add("mav0/" + std::string(image));
   }
   EXPECT_EQ(names(read_sequence(folder_.path(), {0, 1}, true)), std::vector<std::string>{"b"});
-  EXPECT_EQ(read_sequence(folder_.path(), {0, 1}).size(), 3u) << "who reads the image names it";
+  // Before hours of matching, not after them.
+  EXPECT_THAT(error(), HasSubstr("The frame 300 has no image " +
+                                 (folder_ / "mav0/cam0/data/c.png").string()));
 }
 
 TEST_F(Sequences, EachCameraHasAFolderOfItsOwn) {
@@ -166,7 +173,24 @@ TEST_F(Sequences, LinksToNothingAreNoImages) {
   EXPECT_EQ(names(read_sequence(folder_.path(), {0})), std::vector<std::string>{"1"});
 }
 
+TEST_F(Sequences, FilesOfAttributesAreNoImages) {
+  add("cam0/1.png");
+  add("cam0/._1.png", "attributes of macOS");
+  EXPECT_EQ(names(read_sequence(folder_.path(), {0})), std::vector<std::string>{"1"});
+}
+
+TEST_F(Sequences, ListsMayBeginWithAByteOrderMark) {
+  add("mav0/cam0/data.csv",
+      "\xef\xbb\xbf"
+      "100,a.png\n");
+  add("mav0/cam0/data/a.png");
+  EXPECT_EQ(names(read_sequence(folder_.path(), {0})), std::vector<std::string>{"a"});
+}
+
 TEST_F(Sequences, FramesOfOneNameAreRefused) {
+  for (const char* image : {"000001.png", "a/1.png", "b/1.png"}) {
+    add("mav0/cam0/data/" + std::string(image));
+  }
   add("mav0/cam0/data.csv", "200,000001.png\n300,000001.png\n");
   EXPECT_THAT(error({0}), HasSubstr("Two frames have the name 000001, those of "));
   add("mav0/cam0/data.csv", "1000,a/1.png\n2000,b/1.png\n");
@@ -211,6 +235,15 @@ TEST_F(Trajectories, AreReadInTheirOrder) {
   EXPECT_EQ(poses[1].seconds, 1.5);
   const Eigen::Vector3d moved = poses[0].world_from_body * Eigen::Vector3d(1, 0, 0);
   EXPECT_LT((moved - Eigen::Vector3d(1, 3, 3)).norm(), 1e-6) << "a quarter turn about z";
+}
+
+TEST_F(Trajectories, MayBeginWithAByteOrderMark) {
+  const std::string line = "2.5 1 2 3 0 0 0 1\n";
+  for (const std::string& text : {line, "# timestamp tx ty tz qx qy qz qw\n" + line}) {
+    folder_.write("poses.txt", "\xef\xbb\xbf" + text);
+    ASSERT_EQ(read_trajectory(folder_ / "poses.txt").poses.size(), 1u);
+    EXPECT_EQ(read_trajectory(folder_ / "poses.txt").poses[0].seconds, 2.5);
+  }
 }
 
 /// The ground truth of EuRoC and of TUM VI: columns of velocities and biases, or none.
