@@ -29,6 +29,10 @@ constexpr double white_of_16_bits = 65535;
 std::vector<uchar> read_bytes(const fs::path& path) {
   std::error_code error;
   const auto status = fs::status(path, error);
+  if (status.type() == fs::file_type::none) {
+    throw Error("Cannot read " + path.string() + ": " + error.message() +
+                "; check the permissions of its folder.");
+  }
   if (!fs::exists(status)) throw Error("There is no file " + path.string() + "; check the path.");
   if (!fs::is_regular_file(status)) {
     throw Error(path.string() + " is not a file; give an image file.");
@@ -238,7 +242,16 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
 }
 
 cv::Mat read_mask(const std::filesystem::path& path) {
-  return to_intensity(read_image(path), path.string()) > 0;
+  const cv::Mat image = read_image(path);
+  to_intensity(image, path.string());  // refuses what is no image
+  // Before conversion to grey, which rounds the darkest colours to 0.
+  std::vector<cv::Mat> channels;
+  cv::split(image, channels);
+  cv::Mat mask = channels[0] != 0;
+  for (std::size_t i = 1; i < std::min<std::size_t>(channels.size(), 3); ++i) {
+    mask |= channels[i] != 0;
+  }
+  return mask;
 }
 
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name) {

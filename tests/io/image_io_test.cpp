@@ -189,6 +189,13 @@ TEST(Images, MasksAreAllThatIsAboveZero) {
   const cv::Mat expected = cv::Mat_<std::uint8_t>({1, 3}, {0, 255, 255});
   ASSERT_EQ(mask.type(), expected.type());
   EXPECT_EQ(cv::norm(mask, expected, cv::NORM_INF), 0);
+  // Labels: as grey, the darkest colours are 0.
+  const cv::Mat labels = (cv::Mat_<cv::Vec3b>(1, 4) << cv::Vec3b(0, 0, 0), cv::Vec3b(1, 0, 0),
+                          cv::Vec3b(0, 1, 0), cv::Vec3b(0, 0, 1));
+  write_image(folder / "labels.png", labels);
+  const cv::Mat of_labels = read_mask(folder / "labels.png");
+  EXPECT_EQ(of_labels.at<std::uint8_t>(0, 0), 0);
+  EXPECT_EQ(cv::countNonZero(of_labels), 3);
 }
 
 TEST(BadFiles, AreNamed) {
