@@ -97,6 +97,16 @@ constexpr unsigned random_distance = 1u << CANDIDATE_RANDOM_DISTANCE;
 constexpr unsigned surroundings = 1u << CANDIDATE_SURROUNDINGS;
 constexpr unsigned source_planes = 1u << CANDIDATE_SOURCE_PLANE;
 
+/// Smaller images leave pixels in their middle without planes: patches reach over both borders.
+void require_room_for_patches(const View& view, int window_radius) {
+  const int least = 2 * window_radius + 2;
+  if (std::min(view.camera.width, view.camera.height) >= least) return;
+  throw Error("The image of " + view.name + " has " + std::to_string(view.camera.width) + "x" +
+              std::to_string(view.camera.height) + " pixels; patches of radius " +
+              std::to_string(window_radius) + " need " + std::to_string(least) +
+              " both ways: choose a smaller window radius.");
+}
+
 /// Views that one launch runs over.
 struct Views {
   int first = 0;
@@ -114,10 +124,12 @@ class Builder {
     require_few_enough(rig.views.size());
     views_of_rig_ = static_cast<int>(rig.views.size());
     schedule_.views = pyramid(rig, levels_);
+    for (const View& view : rig.views) require_room_for_patches(view, options.window_radius);
     for (const View& view : schedule_.views) {
       if (view.camera.width < 2 || view.camera.height < 2) {
-        throw Error("The image of " + view.name + " is too small for " + std::to_string(levels_) +
-                    " levels: the coarsest would be less than 2 pixels wide; choose fewer levels.");
+        throw Error(
+            "The image of " + view.name + " is too small for " + std::to_string(levels_) +
+            " levels: the coarsest would be less than 2 pixels wide or high; choose fewer levels.");
       }
     }
     schedule_.constants = {

@@ -53,6 +53,14 @@ TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
   EXPECT_THAT(error_of([&] { make_schedule(one, one_level); }), HasSubstr("1 view(s)"));
 }
 
+TEST(ImageSize, LeavesRoomForPatches) {
+  Options options = Options::preset_named("fast");
+  options.window_radius = 15;
+  EXPECT_EQ(error_of([&] { make_schedule(fisheye_rig(32), options); }), "");
+  EXPECT_THAT(error_of([&] { make_schedule(fisheye_rig(31), options); }),
+              HasSubstr("31x31 pixels; patches of radius 15 need 32 both ways"));
+}
+
 /// Launches of one view each.
 std::vector<Kernel> single_launches(const Schedule& schedule) {
   std::vector<Kernel> kernels;
