@@ -10,6 +10,7 @@
 #include "rig_settings.h"
 #include "white_level.h"
 #include "widestereo/epipolar.h"
+#include "widestereo/error.h"
 #include "widestereo/sharpness.h"
 
 namespace ws = widestereo;
@@ -24,15 +25,44 @@ struct CheckArguments {
   bool as_json = false;
 };
 
+// Pixels of median epipolar error: of a calibration that will do, and of the right one at all.
+constexpr double usable = 1;
+constexpr double of_these_cameras = 3;
+
 /// Then the epipolar error tells nothing: where the cameras look the same way, it is as small.
 bool lie_behind(const ws::EpipolarReport& report) { return report.behind > 0.5; }
+
+bool fits(const ws::View& first, const ws::View& second,
+          const std::vector<ws::PixelMatch>& matches) {
+  try {
+    const ws::EpipolarReport report = check_epipolar(first, second, matches);
+    return !lie_behind(report) && report.median_pixels < of_these_cameras;
+  } catch (const ws::Error&) {
+    return false;  // too few features left
+  }
+}
+
+std::string verdict_behind(const ws::View& first, const ws::View& second,
+                           const std::vector<ws::PixelMatch>& matches) {
+  std::vector<ws::PixelMatch> swapped = matches;
+  for (ws::PixelMatch& match : swapped) std::swap(match.first, match.second);
+  ws::View first_there = first;
+  ws::View second_there = second;
+  std::swap(first_there.world_from_camera, second_there.world_from_camera);
+  const bool images_are_swapped = fits(first, second, swapped);
+  const bool poses_are_inverted = fits(first_there, second_there, matches);
+  if (!images_are_swapped && !poses_are_inverted) {
+    return "does not fit: are the images of one moment, and of these cameras?";
+  }
+  return std::string("wrong way round: ") + (images_are_swapped ? "swap the images" : "") +
+         (images_are_swapped && poses_are_inverted ? ", or " : "") +
+         (poses_are_inverted ? "invert the poses" : "");
+}
 
 std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
   char text[160];
   if (lie_behind(report)) {
-    std::snprintf(text, sizeof text,
-                  "%.0f %% of the features lie behind the cameras; are the images in the order of "
-                  "the cameras?",
+    std::snprintf(text, sizeof text, "%.0f %% of the features lie behind the cameras",
                   100 * report.behind);
   } else if (!(report.nearest > 0)) {
     return "no feature is near enough and matched well enough to tell";
@@ -58,10 +88,11 @@ void check(const CheckArguments& arguments) {
   const auto sharpness = ws::compare_sharpness(first, second, left, right, matches);
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
-  const char* verdict = lie_behind(r) ? "wrong way round: swap the images, or invert the poses"
-                        : r.median_pixels < 0.5 ? "good"
-                        : r.median_pixels < 1.0 ? "usable, expect errors where texture is fine"
-                                                : "too inaccurate for stereo: calibrate again";
+  const std::string verdict = lie_behind(r)           ? verdict_behind(first, second, matches)
+                              : r.median_pixels < 0.5 ? "good"
+                              : r.median_pixels < usable
+                                  ? "usable, expect errors where texture is fine"
+                                  : "too inaccurate for stereo: calibrate again";
   if (arguments.as_json) {
     // 0: there is none
     const auto distance = [](double value) {
@@ -88,7 +119,7 @@ void check(const CheckArguments& arguments) {
       "distances: %s\n"
       "calibration: %s\n",
       r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
-      distances_of(r, images.in_metres ? " m" : "").c_str(), verdict);
+      distances_of(r, images.in_metres ? " m" : "").c_str(), verdict.c_str());
   if (!sharpness) return;
   std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
               (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),

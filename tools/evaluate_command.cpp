@@ -52,6 +52,8 @@ void take_from_set(EvaluateArguments& a) {
   take(a.image, "cam" + n + ".png");
   take(a.field_of_view, "fov" + n + ".png");
   take(a.calibration, "calib.yaml");
+  if (a.truth.empty()) throw ws::Error(a.set + " has no depth" + n + ".tiff; give --truth.");
+  if (a.calibration.empty()) throw ws::Error(a.set + " has no calib.yaml; give --calibration.");
 }
 
 void run_evaluate(EvaluateArguments a) {

@@ -5,9 +5,11 @@
 #include <iostream>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <sstream>
 
 #include "commands.h"
 #include "option_checks.h"
+#include "say.h"
 #include "widestereo/error.h"
 
 namespace {
@@ -33,8 +35,15 @@ std::string unknown_command(const CLI::App& app) {
 }
 
 int report_lack_of_memory() {
-  std::cerr << "widestereo: Not enough memory; use smaller images.\n";
+  say("Not enough memory; use smaller images.");
   return 1;
+}
+
+int report(const CLI::App& app, const CLI::ParseError& error) {
+  std::ostringstream message;
+  const int exit_code = app.exit(error, std::cout, message);
+  std::fputs(message.str().c_str(), stderr);
+  return exit_code;
 }
 
 int run(int argc, char** argv) {
@@ -58,26 +67,26 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::RequiredError& error) {
     const std::string unknown = unknown_command(app);
-    if (unknown.empty()) return app.exit(error);
-    std::cerr << "widestereo: " << unknown << "\n";
+    if (unknown.empty()) return report(app, error);
+    say(unknown);
     return error.get_exit_code();
   } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    return report(app, error);
   } catch (const widestereo::Error& error) {
-    std::cerr << "widestereo: " << error.what() << "\n";
+    say(error.what());
     return 1;
   } catch (const std::bad_alloc&) {
     return report_lack_of_memory();
   } catch (const cv::Exception& error) {
     if (error.code == cv::Error::StsNoMem) return report_lack_of_memory();
-    std::cerr << "widestereo: Internal error: " << error.what() << "\n";
+    say(std::string("Internal error: ") + error.what());
     return 1;
   } catch (const std::filesystem::filesystem_error& error) {
-    std::cerr << "widestereo: Cannot use " << error.path1().string() << ": "
-              << error.code().message() << "; check its permissions.\n";
+    say("Cannot use " + error.path1().string() + ": " + error.code().message() +
+        "; check its permissions.");
     return 1;
   } catch (const std::exception& error) {
-    std::cerr << "widestereo: Internal error: " << error.what() << "\n";
+    say(std::string("Internal error: ") + error.what());
     return 1;
   }
   return 0;
@@ -92,11 +101,11 @@ bool flush_standard_output() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // What OpenCV logs of broken images, the command says in a sentence.
+  // What OpenCV logs and prints of broken images, the command says in a sentence.
+  std::cerr.rdbuf(nullptr);
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   const int exit_code = run(argc, argv);
   if (flush_standard_output() || exit_code != 0) return exit_code;
-  std::cerr << "widestereo: Cannot write to standard output; make room where it goes, or write "
-               "elsewhere.\n";
+  say("Cannot write to standard output; make room where it goes, or write elsewhere.");
   return 1;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "match_settings.h"
 
+#include <algorithm>
 #include <type_traits>
 
 #include "option_checks.h"
@@ -14,6 +15,17 @@ using widestereo::PatchPattern;
 using widestereo::PatchWarp;
 using widestereo::Propagation;
 using widestereo::SearchMethod;
+
+namespace {
+
+/// Keeps the numbers of the finest levels; levels more are like the coarsest.
+void fit_to_levels(std::vector<int>& of_levels, int levels) {
+  const auto wanted = static_cast<std::size_t>(std::max(levels, 1));
+  while (of_levels.size() > wanted) of_levels.erase(of_levels.begin());
+  while (of_levels.size() < wanted) of_levels.insert(of_levels.begin(), of_levels.front());
+}
+
+}  // namespace
 
 CLI::Validator warp_names() {
   return name_among<PatchWarp>({{"exact", PatchWarp::exact},
@@ -175,6 +187,11 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
             "Fill rejected pixels from accepted ones up to this many pixels away; 0 = do not");
 }
 
+bool MatchSettings::is_given(const std::string& name) const {
+  return std::any_of(given_.begin(), given_.end(),
+                     [&name](const Parameter& parameter) { return parameter.name == name; });
+}
+
 void MatchSettings::require_effect(const Options& options) const {
   const auto refuse = [&options](const std::string& option) {
     throw widestereo::Error(
@@ -192,6 +209,11 @@ Options MatchSettings::options() const {
   if (min_distance) options.min_distance = *min_distance;
   if (max_distance) options.max_distance = *max_distance;
   for (const Parameter& parameter : given_) parameter.set(options);
+  for (const auto& [name, of_levels] :
+       {std::pair("--level-iterations", &options.level_iterations),
+        std::pair("--level-regressions", &options.level_regressions)}) {
+    if (!is_given(name)) fit_to_levels(*of_levels, options.levels);
+  }
   require_effect(options);
   validate(options);
   return options;

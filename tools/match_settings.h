@@ -37,6 +37,7 @@ struct MatchSettings {
     std::function<void(widestereo::Options&)> set;
   };
 
+  bool is_given(const std::string& name) const;
   /// Throws Error where a given option is not one of the preset's search.
   void require_effect(const widestereo::Options& options) const;
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "matching_run.h"
 
-#include <iostream>
 #include <opencv2/core.hpp>
 
 #include "progress_bar.h"
+#include "say.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/image_io.h"
@@ -41,7 +41,7 @@ void require_device_filter(const ws::DeviceInfo& device) {
 
 ws::Device open_device(const MatchSettings& settings) {
   ws::Device device = ws::Device::open(settings.device);
-  if (!device.note().empty()) std::cerr << "widestereo: " << device.note() << "\n";
+  if (!device.note().empty()) say(device.note());
   const ws::DeviceInfo& info = device.info();
   if (info.kind != ws::DeviceKind::vulkan) {
     if (settings.device.validation) refuse_without_effect("--validation", info, "--device vulkan");
@@ -68,8 +68,7 @@ void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images)
     cv::minMaxLoc(ws::to_grey_levels(images[i], "The image of " + view.name), &darkest, &brightest,
                   nullptr, nullptr, view.mask);
     if (brightest - darkest > noise) continue;
-    std::cerr << "widestereo: the image of " << view.name
-              << " is blank but for noise; check its camera and lens.\n";
+    say("the image of " + view.name + " is blank but for noise; check its camera and lens.");
   }
 }
 

@@ -16,6 +16,7 @@
 #include "input_record.h"
 #include "json_text.h"
 #include "option_checks.h"
+#include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/image_io.h"
@@ -35,28 +36,6 @@ double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
 }
 
 constexpr const char* group = "Output";
-
-/// A folder that is gone, with all in it, when leaving scope; what an interrupted run has left in
-/// it goes first.
-class TemporaryFolder {
- public:
-  explicit TemporaryFolder(fs::path path) : path_(std::move(path)) {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-    ws::prepare_output_folder(path_);
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
 
 /// Removes what the record of an earlier run names, nothing else. The record goes first: without it
 /// the folder is not complete.
@@ -346,6 +325,8 @@ void FolderFormat::require_room_for(double min_distance, double max_distance) co
 }
 
 Json record_in(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_regular_file(folder / result_record, error)) return Json();
   return Json::parse(std::ifstream(folder / result_record), nullptr, false);
 }
 

@@ -7,6 +7,7 @@
 
 #include "json_text.h"
 #include "result_folder.h"
+#include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -109,20 +110,24 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
   record_[kind_.results] = before[kind_.results];
 }
 
+bool ResultFolders::is_of_this_kind(const Json& record) const {
+  const Json whose = record.is_object() ? record.value("input", Json()) : Json();
+  return whose.is_object() && whose.value("run", Json()) == Json(kind_.name);
+}
+
 bool ResultFolders::is_there(const Json& result) const {
   const fs::path path = folder_ / result["name"].get<std::string>();
-  const std::vector<std::string> files = files_of(record_in(path));
-  return !files.empty() && std::all_of(files.begin(), files.end(), [&path](const auto& file) {
-    return fs::exists(path / file);
-  });
+  const Json record = record_in(path);
+  const std::vector<std::string> files = files_of(record);
+  return is_of_this_kind(record) && !files.empty() &&
+         std::all_of(files.begin(), files.end(),
+                     [&path](const auto& file) { return fs::exists(path / file); });
 }
 
 void ResultFolders::remove(const std::string& name) const {
   const fs::path path = folder_ / name;
   if (!fs::exists(path)) return;
-  const Json record = record_in(path);
-  const Json whose = record.is_object() ? record.value("input", Json()) : Json();
-  if (!whose.is_object() || whose.value("run", Json()) != Json(kind_.name)) {
+  if (!is_of_this_kind(record_in(path))) {
     throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +
                     "; choose another folder, or remove it.");
   }
@@ -139,10 +144,8 @@ void ResultFolders::add(const std::string& name,
     throw ws::Error("A result named " + name + " would not lie within " + folder_.string() +
                     "; rename its images.");
   }
-  const fs::path temporary = folder_ / unfinished_result;
-  fs::remove_all(temporary);
-  ws::prepare_output_folder(temporary);
-  Json result = write(temporary);
+  const TemporaryFolder temporary(folder_ / unfinished_result);
+  Json result = write(temporary.path());
   for (const std::string& old : std::exchange(obsolete_, {})) remove(old);
   remove(name);
   // First, so that what has the name is known to be a result, whenever the run ends.
@@ -151,7 +154,7 @@ void ResultFolders::add(const std::string& name,
   const fs::path path = folder_ / name;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
-  fs::rename(temporary, path, error);
+  fs::rename(temporary.path(), path, error);
   if (error) throw ws::Error("Cannot write " + path.string() + ": " + error.message() + ".");
 }
 

@@ -44,6 +44,8 @@ class ResultFolders {
   void keep(Json kept) { record_[kind_.results] = std::move(kept); }
   /// Whether all files of the result that a record is about are still there.
   bool is_there(const Json& result) const;
+  /// `record`: of a result.
+  bool is_of_this_kind(const Json& record) const;
 
   /// What FolderContents::origin says of whose result it is.
   Json origin() const { return {{"run", kind_.name}}; }

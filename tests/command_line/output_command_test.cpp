@@ -225,6 +225,24 @@ TEST_F(Output, NothingToScoreIsAnError) {
   expect_error("view-synthesis " + file("none.tiff") + images, "no textured window to score");
 }
 
+TEST_F(Output, WhatASetLacksIsNamed) {
+  const std::string evaluate =
+      "evaluate " + file("left.png") + " --set " + folder_.path().string() + " --view 2";
+  expect_error(evaluate, "has no depth2.tiff; give --truth");
+  cv::imwrite(file("depth2.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
+  fs::rename(file("calib.yaml"), file("other.yaml"));
+  expect_error(evaluate, "has no calib.yaml; give --calibration");
+}
+
+TEST_F(Output, ARecordThatIsAFolderIsNone) {
+  fs::create_directories(file("out/result.json"));
+  const Outcome outcome = run(depth_of("left.png", "right.png"));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("widestereo: Cannot write " + file("out/result.json")),
+            std::string::npos)
+      << outcome.output;
+}
+
 TEST_F(Output, EarlierResultsAreRemoved) {
   ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,pfm").exit_code, 0);
   const std::set<std::string> mine = {"cloud.ply", "distance0.txt", "distance7.png", "cloud2.ply"};

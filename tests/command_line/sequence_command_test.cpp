@@ -202,6 +202,21 @@ TEST_F(SequenceCommand, FoldersOfOthersAreLeftAlone) {
   expect_left_alone();
 }
 
+TEST_F(SequenceCommand, FramesOverwrittenByOthersAreNoneOfItsOwn) {
+  ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
+  ASSERT_EQ(run("depth " + file("data/cam0/001.png") + " " + file("data/cam1/001.png") + " -c " +
+                file("calib.yaml") + quick + " -o " + file("out/000"))
+                .exit_code,
+            0);
+  expect_error(sequence() + "--count 1", "out/000 is there already and is no result of a sequence");
+}
+
+TEST_F(SequenceCommand, AFullDiskLeavesNothingUnfinished) {
+  const Outcome outcome = run(sequence() + "--count 1", "trap '' XFSZ; ulimit -f 20;");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+  EXPECT_FALSE(fs::exists(folder_ / "out/.unfinished"));
+}
+
 TEST_F(SequenceCommand, AFolderHoldsOneKindOfRun) {
   ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
   const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdio>
+#include <string>
+
+/// Prints a sentence of the command's own on standard error, where std::cerr is silent: libraries
+/// write there what the command says in a sentence.
+inline void say(const std::string& sentence) {
+  std::fprintf(stderr, "widestereo: %s\n", sentence.c_str());
+}
