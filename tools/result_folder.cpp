@@ -8,11 +8,11 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <string>
 #include <system_error>
 
+#include "geometry/angle.h"
 #include "input_record.h"
 #include "json_text.h"
 #include "option_checks.h"
@@ -121,7 +121,7 @@ class ViewWriter {
             {"model", to_string(view_.camera.model)},
             {"width", view_.camera.width},
             {"height", view_.camera.height},
-            {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
+            {"max_theta_degrees", view_.camera.max_theta * ws::degrees_per_radian},
             {"intrinsics", intrinsics_of(view_.camera)},
             {"world_from_camera", to_json(view_.world_from_camera)},
             {"blur_pixels", contents_.blurs.empty() ? 0 : contents_.blurs[index_]},
