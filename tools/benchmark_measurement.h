@@ -17,8 +17,8 @@ struct Measurement {
   std::string options;                          // every parameter as JSON
   widestereo::Filter filter = {};               // that was used
   double wall = 0, wall_min = 0, wall_max = 0;  // milliseconds, the first a median
-  double on_device = 0;                         // of the median run, which the kernels are of
-  std::vector<widestereo::KernelTime> kernels;
+  double on_device = 0;                         // milliseconds, of the median run
+  std::vector<widestereo::KernelTime> kernels;  // of the median run in which each is timed
   std::size_t device_bytes = 0;
 
   double pixels() const { return static_cast<double>(size) * size; }
@@ -26,7 +26,8 @@ struct Measurement {
   double per_second(double amount) const { return on_device > 0 ? 1000 * amount / on_device : 0; }
 };
 
-/// Matches the pair once to warm up, then `runs` times.
+/// Matches the pair once to warm up, then `runs` times, in which each kernel is timed; on a GPU
+/// once and `runs` times more, in which none is: all times but the kernels' are of these then.
 Measurement measure(widestereo::Device& device, const widestereo::RenderedPair& pair,
                     const widestereo::Options& options, int runs);
 

@@ -114,8 +114,7 @@ void add_depth_command(CLI::App& app) {
       ->add_option("images", arguments->images,
                    "LEFT RIGHT (or more views of one rig, or of a moving one); or one image of a "
                    "COLMAP model, which others join")
-      ->required()
-      ->expected(1, ws::Matcher::most_views);
+      ->required();
   add_image_options(*command, arguments->rig, arguments->poses);
   command
       ->add_option("--sources", arguments->sources,

@@ -114,9 +114,7 @@ class EpipolarSphere {
 /// 8-bit grey levels, black where the view's mask excludes.
 cv::Mat grey_levels(const std::string& file, const ws::View& view) {
   const cv::Mat image = ws::read_image(file);
-  if (image.cols != view.camera.width || image.rows != view.camera.height) {
-    throw ws::Error(file + " has another size than the calibration of " + view.name + ".");
-  }
+  ws::require_calibrated_size(image, view, file);
   cv::Mat grey = ws::to_grey_levels(image, file);
   if (!view.mask.empty()) grey.setTo(0, view.mask == 0);
   return grey;

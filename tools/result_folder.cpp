@@ -8,15 +8,16 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <string>
 #include <system_error>
 
+#include "geometry/angle.h"
 #include "input_record.h"
 #include "json_text.h"
 #include "option_checks.h"
 #include "temporary_folder.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/image_io.h"
@@ -100,7 +101,7 @@ class ViewWriter {
             {"model", to_string(view_.camera.model)},
             {"width", view_.camera.width},
             {"height", view_.camera.height},
-            {"max_theta_degrees", view_.camera.max_theta * 180 / std::numbers::pi},
+            {"max_theta_degrees", view_.camera.max_theta * ws::degrees_per_radian},
             {"intrinsics", intrinsics_of(view_.camera)},
             {"world_from_camera", to_json(view_.world_from_camera)},
             {"blur_pixels", contents_.blurs.empty() ? 0 : contents_.blurs[index_]},
@@ -201,6 +202,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
   }
   record["patch_samples"] = run.result.samples;
   record["origin"] = to_json(contents.world_origin);
+  const std::string patch_side = std::to_string(ws::texture_patch_side);
   record["conventions"] = {
       {"unit", contents.in_metres ? "metre" : "that of the reconstruction"},
       {"distance", "units along the unit viewing ray through the pixel centre; 0 = no value"},
@@ -210,15 +212,16 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"normals",
        "unit, camera frame (x right, y down, z forward), facing the camera; file order x y z"},
       {"cost", "1 - ZNCC in [0, 2]; 2 = no plane, 1 = no texture"},
-      {"textured_pixels",
-       "pixels with a plane and a standard deviation of at least 4 grey levels in 9x9 pixels"},
+      {"textured_pixels", "pixels with a plane and a standard deviation of at least " +
+                              ws::text_of(ws::texture_least_deviation) + " grey levels in " +
+                              patch_side + "x" + patch_side + " pixels"},
       {"confidence",
        "probability that the point is within 2 px of its true place in the other view; 0 = no "
        "plane of its own"},
       {"reasons",
        "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
-       "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle; 1024 = filled all the "
-       "same; 0 = accepted; 16 bit"},
+       "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle, and 1024 beside these "
+       "where the pixel was filled; 0 = accepted; 16 bit"},
       {"cloud", "world frame, accepted pixels"},
       {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "geometry/angle.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -94,7 +95,7 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
   }
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     ws::View& view = rig.views[i];
-    if (max_theta > 0) view.camera.max_theta = max_theta * std::numbers::pi / 180;
+    if (max_theta > 0) view.camera.max_theta = max_theta * ws::radians_per_degree;
     if (!read.empty()) view.mask = read[read.size() == 1 ? 0 : i];
   }
 }
@@ -126,6 +127,6 @@ void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& 
         "(--max-theta 180 matches all).\n",
         rig.views[i].name.c_str(),
         of_camera.size() > 1 ? ", like the other images of its camera," : "",
-        rim->dark * 180 / std::numbers::pi, rim->usable * 180 / std::numbers::pi);
+        rim->dark * ws::degrees_per_radian, rim->usable * ws::degrees_per_radian);
   }
 }

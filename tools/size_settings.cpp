@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/validation.h"
+
 namespace ws = widestereo;
 
 void SizeSettings::add_to(CLI::App& command) {
@@ -11,7 +13,7 @@ void SizeSettings::add_to(CLI::App& command) {
       .add_option("--max-image-size", largest_side_,
                   "Largest width and height to match at, pixels; larger images are reduced first, "
                   "and results have their size then")
-      ->check(CLI::Range(32, 16384));
+      ->check(CLI::Range(32, ws::largest_image_side));
 }
 
 cv::Size SizeSettings::size_of(const ws::Camera& camera) const {

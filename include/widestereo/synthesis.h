@@ -14,11 +14,12 @@ namespace widestereo {
 
 /// A rendered view of an analytic scene with its exact ground truth.
 struct RenderedView {
-  cv::Mat image;      ///< CV_8UC3, BGR, black outside the field of view
-  GroundTruth truth;  ///< exact at pixel centres; occlusion relative to the other view of the pair
+  cv::Mat image;  ///< CV_8UC3, BGR, black outside the field of view
+  /// Exact at pixel centres. Occlusion is relative to the next view; of the last one, to the first.
+  GroundTruth truth;
 };
 
-/// Two views of one analytic scene.
+/// The views of one analytic scene.
 struct RenderedPair {
   Rig rig;
   std::vector<RenderedView> views;  ///< as many as rig.views

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration/formats.h"
+#include "geometry/angle.h"
 #include "geometry/validation.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -205,7 +206,7 @@ Rig read_basalt(const Document& document) {
         if (limits.size() != cameras.size() || !limits[i].is_number()) {
           document.fail("\"max_theta_deg\" must hold one number for each camera.");
         }
-        view.camera.max_theta = limits[i].get<double>() * std::numbers::pi / 180;
+        view.camera.max_theta = limits[i].get<double>() * radians_per_degree;
       }
     }
     const Eigen::Isometry3d first_from_imu = rig.views.front().world_from_camera.inverse();
@@ -247,7 +248,7 @@ void write_basalt(const std::filesystem::path& path, const Rig& rig) {
                                   {"qw", q.w()}});
     value["intrinsics"].push_back(calibration::basalt_form(view, path));
     value["resolution"].push_back({view.camera.width, view.camera.height});
-    limits.push_back(view.camera.max_theta * 180 / std::numbers::pi);
+    limits.push_back(view.camera.max_theta * degrees_per_radian);
     limited = limited || view.camera.max_theta < std::numbers::pi;
   }
   calibration::add_defaults(value);

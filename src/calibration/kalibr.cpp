@@ -8,6 +8,7 @@
 
 #include "calibration/formats.h"
 #include "calibration/yaml_camera.h"
+#include "geometry/angle.h"
 #include "geometry/validation.h"
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -147,7 +148,7 @@ void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
         << calibration::texts_of<int>({view.camera.width, view.camera.height});
     if (view.camera.max_theta < std::numbers::pi) {
       out << YAML::Key << "max_theta_deg" << YAML::Value
-          << text_of(view.camera.max_theta * 180 / std::numbers::pi);
+          << text_of(view.camera.max_theta * degrees_per_radian);
     }
     const auto motion = [&out](const char* key, const Eigen::Matrix4d& t) {
       out << YAML::Key << key << YAML::Value << YAML::BeginSeq;

@@ -356,7 +356,7 @@ ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& 
       scores.mean_cost += static_cast<double>(c);
       scores.low_cost += c < 0.2f;
       scores.consistent_relative += difference[0] <= 0.02f;
-      scores.consistent_pixels += difference[1] <= 2.0f;
+      scores.consistent_pixels += static_cast<double>(difference[1]) <= right_pixels;
       if (textured.empty() || textured.at<uchar>(y, x) == 0) continue;
       ++scores.textured;
       scores.low_cost_textured += c < 0.2f;

@@ -13,8 +13,6 @@
 namespace widestereo {
 namespace {
 
-constexpr int largest_side = 16384;
-
 void require(bool good, const std::string& name, const std::string& what, double value,
              const std::string& remedy) {
   if (good) return;
@@ -49,10 +47,12 @@ bool is_rotation(const Eigen::Matrix3d& matrix) {
 }
 
 void validate(const Camera& c, const std::string& name) {
-  require(c.width >= 2 && c.width <= largest_side, name, "the image width", c.width,
-          "it must be 2 to 16384 pixels");
-  require(c.height >= 2 && c.height <= largest_side, name, "the image height", c.height,
-          "it must be 2 to 16384 pixels");
+  const auto require_side = [&name](const char* what, int side) {
+    require(side >= 2 && side <= largest_image_side, name, what, side,
+            "it must be 2 to " + std::to_string(largest_image_side) + " pixels");
+  };
+  require_side("the image width", c.width);
+  require_side("the image height", c.height);
   require_finite(c, name);
   require(c.fx > 0, name, "fx", c.fx, "it must be positive");
   require(c.fy > 0, name, "fy", c.fy, "it must be positive");

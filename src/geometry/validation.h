@@ -9,6 +9,9 @@
 
 namespace widestereo {
 
+/// Width and height of a camera's image at most, pixels.
+inline constexpr int largest_image_side = 16384;
+
 /// Whether a matrix is a rotation, but for entries rounded to four digits.
 bool is_rotation(const Eigen::Matrix3d& matrix);
 

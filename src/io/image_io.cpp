@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "io/pfm.h"
+#include "text/lower_case.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -160,11 +161,7 @@ void encode(const fs::path& path, const cv::Mat& image, const std::vector<int>& 
   });
 }
 
-std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
+std::string extension_of(const fs::path& path) { return lower_case(path.extension().string()); }
 
 /// OpenCV keeps channels in B G R order, maps are x y z.
 cv::Mat with_channels_swapped(const cv::Mat& map) {

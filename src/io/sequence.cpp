@@ -8,6 +8,7 @@
 #include <map>
 
 #include "text/byte_order_mark.h"
+#include "text/lower_case.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -18,9 +19,7 @@ namespace fs = std::filesystem;
 bool is_image(const fs::path& path) {
   static constexpr std::array<const char*, 9> extensions = {
       ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"};
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(path.extension().string());
   return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
 }
 

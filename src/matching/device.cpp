@@ -8,6 +8,7 @@
 #include "cpu/cpu_device.h"
 #include "cuda/cuda_device.h"
 #include "matching/backend.h"
+#include "text/lower_case.h"
 #include "vulkan/vulkan_device.h"
 #include "widestereo/error.h"
 
@@ -34,12 +35,6 @@ int rank(const DeviceInfo& info) {
   if (info.type == "integrated gpu") return not_cuda + 1;
   if (info.type == "virtual gpu") return not_cuda + 2;
   return info.kind == DeviceKind::cpu ? 7 : 6;
-}
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
 }
 
 std::string names_of(const std::vector<DeviceInfo>& devices) {
