@@ -122,18 +122,20 @@ PosedImages PosedImageSettings::of_model() const {
 }
 
 PosedImages PosedImageSettings::of_trajectory() const {
-  const int first = rig.views.empty() ? 0 : rig.views.front();
-  const cv::Size of_image = ws::read_image(frames.example(images, first)).size();
-  // Says first what is wrong with a calibration that should have had poses.
-  const ws::Calibration calibration = ws::read_calibration(rig.calibration, of_image);
   if (!poses.given() && frames.count != 1) {
+    // Of a model that lacks a file, reading says so.
+    if (fs::is_directory(rig.calibration)) ws::read_calibration(rig.calibration);
     throw ws::Error(rig.calibration +
                     " is no COLMAP model or transforms.json, so that the poses of the frames are "
                     "not known; give --poses, or take one frame (--count 1).");
   }
+  const int first = rig.views.empty() ? 0 : rig.views.front();
+  const cv::Size of_image = ws::read_image(frames.example(images, first)).size();
   std::vector<int> cameras = rig.views;
   if (cameras.empty()) {
-    cameras.resize(frames.folders.empty() ? calibration.rig.views.size() : frames.folders.size());
+    cameras.resize(frames.folders.empty()
+                       ? ws::read_calibration(rig.calibration, of_image).rig.views.size()
+                       : frames.folders.size());
     std::iota(cameras.begin(), cameras.end(), 0);
   }
   const ChosenFrames chosen = frames.choose(images, cameras);

@@ -194,7 +194,7 @@ class Alignment {
     return percentile(distances, 0.5);
   }
 
-  /// rows_[i].
+  /// Fills rows_[i].
   void set_rows(std::size_t i, const ScaledView& view) {
     std::vector<Row>& rows = rows_[i];
     rows.clear();
@@ -248,11 +248,11 @@ class Alignment {
     }
     normals.points = sizes.size();
     if (sizes.empty()) return normals;
-    const double scale = deviations_per_median * percentile(sizes, 0.5) + 1e-4;
-    normals.variance = scale * scale;
+    const double deviation = deviations_per_median * percentile(sizes, 0.5) + 1e-4;
+    normals.variance = deviation * deviation;
     std::vector<ViewNormals> normals_of_views(views.size());
     for_each_view(views.size(),
-                  [&](std::size_t i) { normals_of_views[i] = normals_of(rows_[i], scale); });
+                  [&](std::size_t i) { normals_of_views[i] = normals_of(rows_[i], deviation); });
     for (std::size_t i = 0; i < views.size(); ++i) {
       const ViewNormals& of_view = normals_of_views[i];
       const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);

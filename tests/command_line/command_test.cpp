@@ -442,14 +442,14 @@ TEST_F(Command, RefusedRequestsLeaveNoFolder) {
                             file("calib.yaml") + " -o " + file("out") + " ";
   cv::imwrite(file("one.png"), cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)));
   cv::imwrite(file("none.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
-  expect_error(depth + "--device cpu --levels 4", "level iterations");
+  expect_error(depth + "--device cpu --level-iterations 1", "level iterations");
   expect_error(depth + "--device cpux", "cpux");
   expect_error("depth " + file("one.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
                    " -o " + file("out") + " --device cpu",
                file("one.png") + " is 1x1 pixels");
   expect_error(depth + "--device cpu --mask " + file("none.png"),
                "The mask " + file("none.png") + " is 0 everywhere");
-  expect_error("demo --size 64 --device cpu --levels 4 -o " + file("out"), "level iterations");
+  expect_error("demo --size 64 --device cpu --level-iterations 1 -o " + file("out"), "level iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 

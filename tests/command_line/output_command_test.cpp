@@ -125,7 +125,7 @@ TEST_F(Output, LackOfMemoryIsNamed) {
 #endif
 
 TEST_F(Output, PicturesAreOfAnySize) {
-  for (const cv::Size size : {cv::Size(8, 8), {9, 17}, {4, 64}, {64, 2}, {10, 10}}) {
+  for (const cv::Size size : {cv::Size(8, 8), {9, 17}, {6, 64}, {64, 6}, {10, 10}}) {
     cv::Mat image(size, CV_8UC1);
     cv::randu(image, 0, 255);
     cv::imwrite(file("small.png"), image);
