@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <cstring>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -79,11 +78,6 @@ inline cv::Mat run(Backend& backend, KernelFixture& match) {
 inline cv::Mat run(Device::Implementation& device, KernelFixture& match) {
   const auto backend = device.make_backend(sizes_of(match.rig()), match.schedule().constants);
   return run(*backend, match);
-}
-
-inline bool same_bits(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
-         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
 /// Parts of an application that has a device of its own.

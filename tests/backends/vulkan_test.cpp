@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "bytes_of.h"
 #include "device_fixture.h"
+#include "same_bits.h"
 #include "schedule/bands.h"
 #include "vulkan/physical_device.h"
 #include "vulkan/vulkan_backend.h"
@@ -527,10 +529,7 @@ class VulkanCache : public ::testing::Test {
     Application application(false);
     return PipelineCache(application.context, path_).loaded_from_file();
   }
-  std::string content() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string content() const { return bytes_of(path_); }
   void overwrite(const std::string& content) const {
     std::ofstream(path_, std::ios::binary) << content;
   }

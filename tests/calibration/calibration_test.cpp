@@ -7,23 +7,26 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
+#include "bytes_of.h"
 #include "comma_locale.h"
 #include "damaged_texts.h"
 #include "data_folder.h"
 #include "error_of.h"
+#include "replaced.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
 
+using test::bytes_of;
+using test::replaced;
 using test::TemporaryFolder;
 
 const char* const kalibr_text = R"(cam0:
@@ -93,12 +96,6 @@ T: !!opencv-matrix
 image_width: 1280
 image_height: 960
 )";
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 /// X y z are z x y in the camera, which the IMU is beside.
 const char* const beside_imu = R"(:
@@ -215,13 +212,8 @@ TEST(Kalibr, ReadsPosesThatOnlyTheImuGives) {
   Rig to_imu = rig;
   to_imu.world_from_imu = camera_beside_imu();
   write_kalibr(folder / "both.yaml", to_imu);
-  std::string text;
-  {
-    std::ifstream stream(folder / "both.yaml");
-    text.assign(std::istreambuf_iterator<char>(stream), {});
-  }
-  const Rig again =
-      read_calibration(folder.write("imu.yaml", replaced(text, "T_cn_cnm1", "unused"))).rig;
+  const std::string text = replaced(bytes_of(folder / "both.yaml"), "T_cn_cnm1", "unused");
+  const Rig again = read_calibration(folder.write("imu.yaml", text)).rig;
   EXPECT_LT(
       (again.views[1].world_from_camera.matrix() - rig.views[1].world_from_camera.matrix()).norm(),
       1e-9);

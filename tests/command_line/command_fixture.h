@@ -14,6 +14,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "bytes_of.h"
+#include "data_folder.h"
 #include "temporary_folder.h"
 
 namespace widestereo::test {
@@ -92,10 +94,7 @@ cam1:
 
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   /// Of a file in the folder, or of any by its whole path.
-  std::string bytes_of(const std::string& name) const {
-    std::ifstream stream(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  std::string bytes_of(const std::string& name) const { return test::bytes_of(folder_ / name); }
   std::string depth_of(const std::string& left, const std::string& right,
                        const std::string& calibration = "calib.yaml") const {
     return "depth " + file(left) + " " + file(right) + " -c " + file(calibration) + " -o " +

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 
+#include "error_of.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -26,12 +27,7 @@ Rig two_views() {
 }
 
 std::string message_of(const Rig& rig) {
-  try {
-    validate(rig, "rig.yaml");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { validate(rig, "rig.yaml"); });
 }
 
 TEST(RigValidation, AcceptsARig) { EXPECT_EQ(message_of(two_views()), ""); }

@@ -16,8 +16,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "bytes_of.h"
 #include "comma_locale.h"
 #include "error_of.h"
+#include "same_bits.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -26,13 +28,10 @@
 namespace widestereo {
 namespace {
 
+using test::bytes_of;
 using test::error_of;
+using test::same_bits;
 using test::TemporaryFolder;
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 cv::Mat random_map(int type) {
   cv::Mat map(37, 53, type);
@@ -50,11 +49,7 @@ TEST(Maps, TiffAndPfmKeepEveryBit) {
     for (const char* name : {"a.tiff", "a.tif", "a.pfm"}) {
       write_map(folder / name, map);
       const cv::Mat again = read_map(folder / name);
-      ASSERT_EQ(again.type(), type) << name;
-      ASSERT_EQ(again.size(), map.size());
-      for (int y = 0; y < map.rows; ++y) {
-        EXPECT_EQ(std::memcmp(map.ptr(y), again.ptr(y), map.cols * map.elemSize()), 0) << name;
-      }
+      EXPECT_TRUE(same_bits(map, again)) << name;
     }
   }
 }
@@ -130,7 +125,7 @@ TEST(Images, KeepTheirDepthAndChannels) {
     write_image(folder / "i.png", image);
     const cv::Mat again = read_image(folder / "i.png");
     ASSERT_EQ(again.type(), type);
-    EXPECT_EQ(cv::norm(image, again, cv::NORM_INF), 0);
+    EXPECT_TRUE(same_bits(image, again));
   }
 }
 
@@ -147,7 +142,7 @@ TEST(Images, Of16BitsGoToFormatsThatHoldThem) {
     }
     for (const char* name : {"a.png", "a.tiff", type == CV_16UC1 ? "a.pgm" : "a.ppm"}) {
       write_image(folder / name, image);
-      EXPECT_EQ(cv::norm(image, read_image(folder / name), cv::NORM_INF), 0) << name;
+      EXPECT_TRUE(same_bits(image, read_image(folder / name))) << name;
     }
   }
 }
@@ -171,7 +166,7 @@ TEST(Images, OfFewerBitsAreStretched) {
   const cv::Mat of_12_bits = cv::Mat_<std::uint16_t>({1, 3}, {0, 819, 4095});
   const cv::Mat result = stretched(of_12_bits, 4095, "x");
   const cv::Mat expected = cv::Mat_<std::uint16_t>({1, 3}, {0, 13107, 65535});
-  EXPECT_EQ(cv::norm(result, expected, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(result, expected));
   EXPECT_EQ(stretched(cv::Mat(2, 2, CV_16UC3, cv::Scalar::all(255)), 255, "x").at<ushort>(1, 5),
             65535);
   EXPECT_NE(error_of([&] {
@@ -188,7 +183,7 @@ TEST(Images, MasksAreAllThatIsAboveZero) {
   const cv::Mat mask = read_mask(folder / "mask.png");
   const cv::Mat expected = cv::Mat_<std::uint8_t>({1, 3}, {0, 255, 255});
   ASSERT_EQ(mask.type(), expected.type());
-  EXPECT_EQ(cv::norm(mask, expected, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(mask, expected));
 }
 
 TEST(BadFiles, AreNamed) {

@@ -8,8 +8,10 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "bytes_of.h"
 #include "comma_locale.h"
 #include "error_of.h"
+#include "same_bits.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -17,6 +19,8 @@
 
 namespace widestereo {
 namespace {
+
+using test::same_bits;
 
 TEST(Pictures, NearIsRedFarIsBlueNothingIsGrey) {
   const cv::Mat distance = (cv::Mat_<float>(1, 3) << 1, 10, 0);
@@ -97,7 +101,7 @@ TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
                               with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
     EXPECT_EQ(with.cols, 200);
     EXPECT_GT(with.rows, 110);
-    EXPECT_EQ(cv::norm(with.rowRange(0, 100), picture, cv::NORM_INF), 0);
+    EXPECT_TRUE(same_bits(with.rowRange(0, 100), picture));
     cv::Scalar mean;
     cv::Scalar spread;
     cv::meanStdDev(with.rowRange(100, with.rows), mean, spread);
@@ -108,7 +112,7 @@ TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
 TEST(Pictures, DistanceLegendNamesTheUnit) {
   const cv::Mat picture(100, 400, CV_8UC3, cv::Scalar(1, 2, 3));
   const cv::Mat metres = with_distance_legend(picture, {1, 5});
-  EXPECT_EQ(cv::norm(metres, with_distance_legend(picture, {1, 5}, " m"), cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(metres, with_distance_legend(picture, {1, 5}, " m")));
   EXPECT_GT(cv::norm(metres, with_distance_legend(picture, {1, 5}, ""), cv::NORM_INF), 100);
 }
 
@@ -130,7 +134,7 @@ TEST(Pictures, TakeImagesOfAnySize) {
       for (const cv::Mat& with : {with_distance_legend(picture, {1, 5}),
                                   with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
         EXPECT_EQ(with.cols, std::max(cols, 64));
-        EXPECT_EQ(cv::norm(with(cv::Rect({}, picture.size())), picture, cv::NORM_INF), 0);
+        EXPECT_TRUE(same_bits(with(cv::Rect({}, picture.size())), picture));
         const cv::Mat sheet = panel_sheet({{"image", picture}, {"legend", with}}, 4);
         EXPECT_GT(sheet.rows, with.rows) << cols << "x" << rows;
       }
@@ -249,8 +253,7 @@ TEST(PointCloud, FilesDoNotDependOnTheLocale) {
   const test::TemporaryFolder folder;
   const test::CommaStreams streams;
   write_ply(folder / "c.ply", PointCloud(1234));
-  std::ifstream file(folder / "c.ply", std::ios::binary);
-  const std::string header{std::istreambuf_iterator<char>(file), {}};
+  const std::string header = test::bytes_of(folder / "c.ply");
   EXPECT_NE(header.find("element vertex 1234\n"), std::string::npos);
 }
 
