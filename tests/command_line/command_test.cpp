@@ -453,9 +453,9 @@ TEST_F(Command, ImagesWithoutOverlapAreRefused) {
   expect_error(depth_of("left.png", "right.png", "apart.yaml"), "do not overlap");
 }
 
-TEST_F(Command, WithoutAVulkanDriverItSaysSoAndUsesTheCpu) {
+TEST_F(Command, WithoutAGpuItSaysSoAndUsesTheCpu) {
   const std::string no_driver =
-      "VK_ICD_FILENAMES=/nonexistent.json VK_DRIVER_FILES=/nonexistent.json";
+      "VK_ICD_FILENAMES=/nonexistent.json VK_DRIVER_FILES=/nonexistent.json CUDA_VISIBLE_DEVICES=";
   const std::string arguments = "demo --size 64 -o " + file("demo");
   const Outcome strict = run(arguments + " --device vulkan", no_driver);
   EXPECT_EQ(strict.exit_code, 1);
