@@ -32,17 +32,26 @@ namespace widestereo::test {
     }                                                                              \
   } while (false)
 
-/// Two views of different sizes, which also are no multiples of a workgroup, through every kernel.
-inline KernelFixture small_match() {
-  Rig rig = fisheye_rig(45);
-  rig.views[1].camera = fisheye_camera(38);
-  Options options;
+/// Cold and warm matches with the presets paper and fast together have every kernel.
+inline Options options_of_small_match(const std::string& preset) {
+  Options options = Options::preset_named(preset);
   options.min_distance = 0.3;
   options.max_distance = 10;
   options.window_radius = 2;
   options.first_iterations = 2;
   options.second_iterations = 1;
-  return KernelFixture(std::move(rig), options);
+  if (preset == "fast") {
+    options.ambiguity_margin = 0.2;
+    options.fill_radius = 4;
+  }
+  return options;
+}
+
+/// Two views of different sizes, which also are no multiples of a workgroup.
+inline KernelFixture small_match(const std::string& preset = "paper") {
+  Rig rig = fisheye_rig(45);
+  rig.views[1].camera = fisheye_camera(38);
+  return KernelFixture(std::move(rig), options_of_small_match(preset));
 }
 
 inline std::vector<cv::Size> sizes_of(const Rig& rig) {

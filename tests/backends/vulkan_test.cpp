@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "bytes_of.h"
 #include "device_fixture.h"
@@ -77,6 +78,35 @@ TEST(VulkanDevices, MissingIndexIsAnError) {
 }
 
 TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const auto device = open_vulkan_device(0, validated());
+  std::set<std::string> have_run;
+  for (const char* preset : {"paper", "fast"}) {
+    SCOPED_TRACE(preset);
+    KernelFixture match = small_match(preset);
+    const Schedule& cold = match.schedule();
+    const auto backend = device->make_backend(sizes_of({.views = cold.views}), cold.constants);
+    upload(*backend, match);
+    for (std::size_t i = match.rig().views.size(); i < cold.views.size(); ++i) {
+      backend->set_rays(static_cast<int>(i), ray_image(cold.views[i].camera, cold.views[i].mask));
+    }
+    Schedule warm = make_warm_schedule(match.rig(), options_of_small_match(preset));
+    set_motion(warm, match.rig(), Eigen::Isometry3d::Identity(), 1);
+    for (const Schedule& schedule : {cold, warm}) {
+      backend->run(schedule, {});
+      for (const KernelTime& time : backend->times()) have_run.insert(time.kernel);
+    }
+    EXPECT_LT(cv::Mat_<cv::Vec4f>(backend->hypotheses(1))(19, 19)[3], INVALID_COST);
+  }
+  for (int i = 0; i < kernel_count; ++i) {
+    const auto kernel = static_cast<Kernel>(i);
+    EXPECT_EQ(have_run.contains(to_string(kernel)), kernel != Kernel::iterate_raster)
+        << to_string(kernel);
+  }
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
   REQUIRE_VULKAN_OR_SKIP();
   const auto device = open_vulkan_device(0, validated(20000));
   KernelFixture match = small_match();
