@@ -697,6 +697,16 @@ TEST(Launches, OverSeveralViewsMayRunThemInAnyOrder) {
   }
 }
 
+TEST(KernelTimes, AreTakenOnTheCpuInAnyCase) {
+  const RenderedPair pair = render_demo(64);
+  Device device = Device::open("cpu");
+  Matcher matcher(device, pair.rig, small_options());
+  matcher.time_kernels(false);
+  const std::vector<KernelTime> times = matcher.match(images_of(pair)).times;
+  ASSERT_FALSE(times.empty());
+  for (const KernelTime& time : times) EXPECT_GT(time.milliseconds, 0) << time.kernel;
+}
+
 TEST(Checkerboard, ReachesRasterOrder) {
   Device cpu = Device::open("cpu");
   const RenderedPair pair = render_demo(96);

@@ -82,6 +82,21 @@ TEST(ResizedViews, ExcludePixelsThatCoverExcludedOnes) {
   EXPECT_THROW(resized(view, 32, 24), Error);
 }
 
+TEST(Maps, HaveTheCalibratedSize) {
+  const View view = two_views().views[1];  // of 64x48 pixels
+  const auto error = [&view](int width, int height) {
+    return test::error_of(
+        [&] { require_calibrated_size(cv::Mat(height, width, CV_8UC1), view, "map.tiff"); });
+  };
+  EXPECT_EQ(error(64, 48), "");
+  for (const auto& [width, height] : {std::pair(48, 64), {63, 48}, {64, 49}}) {
+    EXPECT_EQ(error(width, height),
+              "map.tiff is " + std::to_string(width) + "x" + std::to_string(height) +
+                  " pixels, but the calibration of cam1 is for 64x48; use images of the "
+                  "calibrated size.");
+  }
+}
+
 TEST(Masks, ExcludeTheNearestPixelAndWhatIsOutside) {
   View view;
   EXPECT_FALSE(is_masked(view, {-5, 1})) << "no mask";

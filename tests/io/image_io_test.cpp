@@ -162,6 +162,17 @@ TEST(Images, BecomeIntensities) {
   EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32FC1, cv::Scalar(3)), "x"), Error);
 }
 
+TEST(Images, BecomeGreyLevels) {
+  const cv::Mat deep = cv::Mat_<std::uint16_t>({1, 3}, {0, 13107, 65535});
+  const cv::Mat expected = cv::Mat_<std::uint8_t>({1, 3}, {0, 51, 255});
+  EXPECT_TRUE(same_bits(to_grey_levels(deep, "x"), expected));
+  EXPECT_EQ(to_grey_levels(cv::Mat(1, 1, CV_8UC3, cv::Scalar(0, 255, 0)), "x").at<uchar>(0), 150);
+  const TemporaryFolder folder;
+  write_image(folder / "deep.png", deep);
+  EXPECT_TRUE(same_bits(read_grey_levels(folder / "deep.png"), expected));
+  EXPECT_NE(error_of([] { to_grey_levels({}, "none.png"); }).find("none.png"), std::string::npos);
+}
+
 TEST(Images, OfFewerBitsAreStretched) {
   const cv::Mat of_12_bits = cv::Mat_<std::uint16_t>({1, 3}, {0, 819, 4095});
   const cv::Mat result = stretched(of_12_bits, 4095, "x");
