@@ -824,10 +824,10 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
 
 TEST_F(Command, HelpAndVersion) {
   for (const char* arguments :
-       {"--help", "demo --help", "depth --help", "sequence --help", "evaluate --help",
-        "view-synthesis --help", "calibration --help", "calibration show --help",
-        "calibration refine --help", "devices --help", "benchmark --help", "--version", "devices",
-        "devices --json"}) {
+       {"--help", "demo --help", "depth --help", "sequence --help", "reconstruct --help",
+        "evaluate --help", "view-synthesis --help", "calibration --help", "calibration show --help",
+        "calibration check --help", "calibration refine --help", "calibration convert --help",
+        "devices --help", "benchmark --help", "--version", "devices", "devices --json"}) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.exit_code, 0) << arguments << outcome.output;
     EXPECT_FALSE(outcome.output.empty());
