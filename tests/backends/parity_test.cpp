@@ -51,8 +51,7 @@ void expect_agreement(const ViewResult& expected, const ViewResult& actual, doub
 /// With the rays and the images.
 std::unique_ptr<Backend> make_backend(Device& device, const Schedule& schedule,
                                       const RenderedPair& pair) {
-  std::vector<cv::Size> sizes;
-  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  const std::vector<cv::Size> sizes = sizes_of(schedule.views);
   auto backend = device.implementation().make_backend(sizes, schedule.constants);
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const int view = static_cast<int>(i);
@@ -616,10 +615,7 @@ TEST(Costs, AreThoseOfThePlanes) {
     options.warm_regressions = 2;
     KernelFixture match(fisheye_rig(side), options);
     const Schedule& schedule = match.schedule();
-    std::vector<cv::Size> sizes;
-    for (const View& view : schedule.views) {
-      sizes.emplace_back(view.camera.width, view.camera.height);
-    }
+    const std::vector<cv::Size> sizes = sizes_of(schedule.views);
     const Device cpu = Device::open("cpu");
     const auto backend = cpu.implementation().make_backend(sizes, schedule.constants);
     for (std::size_t i = 0; i < sizes.size(); ++i) {

@@ -54,16 +54,13 @@ inline KernelFixture small_match(const std::string& preset = "paper") {
   return KernelFixture(std::move(rig), options_of_small_match(preset));
 }
 
-inline std::vector<cv::Size> sizes_of(const Rig& rig) {
-  std::vector<cv::Size> sizes;
-  for (const View& view : rig.views) sizes.emplace_back(view.camera.width, view.camera.height);
-  return sizes;
-}
-
 inline void upload(Backend& backend, KernelFixture& match) {
-  for (int i = 0; i < static_cast<int>(match.rig().views.size()); ++i) {
-    backend.set_rays(i, match.view(i).rays);
-    backend.set_intensity(i, match.view(i).image());
+  const std::vector<View>& views = match.schedule().views;
+  for (int i = 0; i < static_cast<int>(views.size()); ++i) {
+    backend.set_rays(i, ray_image(views[i].camera, views[i].mask));
+    if (i < static_cast<int>(match.rig().views.size())) {
+      backend.set_intensity(i, match.view(i).image());
+    }
   }
 }
 
@@ -85,7 +82,8 @@ inline cv::Mat run(Backend& backend, KernelFixture& match) {
 }
 
 inline cv::Mat run(Device::Implementation& device, KernelFixture& match) {
-  const auto backend = device.make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device.make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   return run(*backend, match);
 }
 

@@ -85,11 +85,8 @@ TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
     SCOPED_TRACE(preset);
     KernelFixture match = small_match(preset);
     const Schedule& cold = match.schedule();
-    const auto backend = device->make_backend(sizes_of({.views = cold.views}), cold.constants);
+    const auto backend = device->make_backend(sizes_of(cold.views), cold.constants);
     upload(*backend, match);
-    for (std::size_t i = match.rig().views.size(); i < cold.views.size(); ++i) {
-      backend->set_rays(static_cast<int>(i), ray_image(cold.views[i].camera, cold.views[i].mask));
-    }
     Schedule warm = make_warm_schedule(match.rig(), options_of_small_match(preset));
     set_motion(warm, match.rig(), Eigen::Isometry3d::Identity(), 1);
     for (const Schedule& schedule : {cold, warm}) {
@@ -110,7 +107,8 @@ TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
   REQUIRE_VULKAN_OR_SKIP();
   const auto device = open_vulkan_device(0, validated(20000));
   KernelFixture match = small_match();
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   upload(*backend, match);
   std::vector<double> shares;
   backend->run(match.schedule(), [&](double share) { shares.push_back(share); });
@@ -137,7 +135,8 @@ TEST(VulkanMatch, KernelsNeedNotBeTimed) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   const cv::Mat timed = run(*backend, match);
   const std::vector<KernelTime> times = backend->times();
   double sum = 0;
@@ -168,7 +167,8 @@ TEST(VulkanMatch, AMatcherCanRunAgain) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   const cv::Mat first = run(*backend, match);
   EXPECT_TRUE(same_bits(first, run(*backend, match)));
   EXPECT_THAT(device->validation_messages(), IsEmpty());
@@ -178,7 +178,8 @@ TEST(VulkanMatch, ARunAbortedAtAnyCallbackLeavesTheMatcherUsable) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated(5000));
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   const cv::Mat expected = run(*backend, match);
   // Either of the two submissions is left in flight, and uploads use the first one.
   for (const int last : {1, 2, 3}) {
@@ -201,8 +202,8 @@ TEST(VulkanMatch, TexturesAndStorageImagesGiveTheSameBits) {
   match.schedule().constants.filter = static_cast<int>(Filter::exact);
   std::vector<cv::Mat> results;
   for (const bool sampled : {false, true}) {
-    VulkanBackend backend(application.context, sizes_of(match.rig()), match.schedule().constants,
-                          application.cache, {.sampled = sampled});
+    VulkanBackend backend(application.context, sizes_of(match.schedule().views),
+                          match.schedule().constants, application.cache, {.sampled = sampled});
     results.push_back(run(backend, match));
   }
   EXPECT_TRUE(same_bits(results[0], results[1]));
@@ -217,7 +218,7 @@ TEST(VulkanMatch, TextureUnitsFilterAsWellAsTheirPositions) {
   match.schedule().constants.texels_per_pixel = 2;   // positions are rounded to 1/512 pixel
   const auto costs = [&](const VulkanContext& context, Filter filter) {
     match.schedule().constants.filter = static_cast<int>(filter);
-    VulkanBackend backend(context, sizes_of(match.rig()), match.schedule().constants,
+    VulkanBackend backend(context, sizes_of(match.schedule().views), match.schedule().constants,
                           application.cache, {.sampled = true});
     return std::pair(run(backend, match), static_cast<double>(backend.device_bytes()));
   };
@@ -251,7 +252,8 @@ TEST(VulkanMatch, RecordsIntoAnApplicationsCommandBuffer) {
   const VulkanContext adopted(application.context.handles());
   PipelineCache cache(adopted, {});
   KernelFixture match = small_match();
-  VulkanBackend backend(adopted, sizes_of(match.rig()), match.schedule().constants, cache);
+  VulkanBackend backend(adopted, sizes_of(match.schedule().views), match.schedule().constants,
+                        cache);
   const cv::Mat expected = run(backend, match);
   const cv::Mat nothing(match.view(0).rays.size(), CV_32FC4, cv::Scalar::all(0));
   backend.set_hypotheses(0, nothing);
@@ -339,7 +341,8 @@ TEST(VulkanMatch, LeavesNoObjectBehind) {
                                 instance.physical_devices().at(0));
     PipelineCache cache(context, {});
     KernelFixture match = small_match();
-    VulkanBackend backend(context, sizes_of(match.rig()), match.schedule().constants, cache);
+    VulkanBackend backend(context, sizes_of(match.schedule().views), match.schedule().constants,
+                          cache);
     run(backend, match);
   }
   // The layer names every object that outlives its device.
@@ -350,7 +353,8 @@ TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, {});
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   EXPECT_THAT(error_of([&] { backend->set_rays(1, match.view(0).rays); }), HasSubstr("38x38"));
   EXPECT_THAT(error_of([&] { backend->set_intensity(0, match.view(0).rays); }),
               HasSubstr("CV_32FC1"));

@@ -189,8 +189,7 @@ TEST_F(CudaEmulation, AGraphIsMadeOnceForTheSameSchedule) {
 TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
   KernelFixture match(rig_, options_);
   Schedule schedule = match.schedule();
-  std::vector<cv::Size> sizes;
-  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  const std::vector<cv::Size> sizes = sizes_of(schedule.views);
   Device device = Device::open("cuda");
   const auto backend = device.implementation().make_backend(sizes, schedule.constants);
   for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
