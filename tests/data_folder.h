@@ -18,9 +18,15 @@ inline std::filesystem::path data_folder() {
   return std::filesystem::is_directory(folder) ? folder : std::filesystem::path();
 }
 
-/// Skips a test that needs them where there are none.
-#define SKIP_WITHOUT_STEREO_SETS()               \
-  if (::widestereo::test::data_folder().empty()) \
-  GTEST_SKIP() << "no stereo sets; WIDESTEREO_DATA names their folder"
+/// Skips a test that needs them where there are none; where WIDESTEREO_DATA names no folder it
+/// fails instead.
+#define SKIP_WITHOUT_STEREO_SETS()                                            \
+  do {                                                                        \
+    if (!::widestereo::test::data_folder().empty()) break;                    \
+    if (const char* named = std::getenv("WIDESTEREO_DATA")) {                 \
+      FAIL() << "WIDESTEREO_DATA is \"" << named << "\", which is no folder"; \
+    }                                                                         \
+    GTEST_SKIP() << "no stereo sets; WIDESTEREO_DATA names their folder";     \
+  } while (false)
 
 }  // namespace widestereo::test

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
-// An application of the installed package: what README.md shows, on a rendered pair.
-#include <widestereo/calibration.h>
-#include <widestereo/cuda.h>
+// An application of the installed package, on a rendered pair.
 #include <widestereo/matcher.h>
 #include <widestereo/synthesis.h>
-#include <widestereo/vulkan.h>
 
 #include <cstdio>
 #include <opencv2/core.hpp>

@@ -8,8 +8,10 @@
 #include <optional>
 
 #include "device_fixture.h"
+#include "match_fixture.h"
 #include "matching/backend.h"
 #include "pixel_fixture.h"
+#include "same_bits.h"
 #include "vulkan_fixture.h"
 #include "widestereo/cuda.h"
 #include "widestereo/matcher.h"
@@ -38,36 +40,21 @@ std::vector<Options> every_method() {
   return list;
 }
 
-std::vector<cv::Mat> images_of(const RenderedPair& pair) {
-  std::vector<cv::Mat> images;
-  for (const RenderedView& view : pair.views) images.push_back(view.image);
-  return images;
-}
-
-void expect_same(const StereoResult& a, const StereoResult& b) {
-  ASSERT_EQ(a.views.size(), b.views.size());
-  for (std::size_t i = 0; i < a.views.size(); ++i) {
-    EXPECT_TRUE(same_bits(a.views[i].hypotheses, b.views[i].hypotheses));
-    EXPECT_TRUE(same_bits(a.views[i].confidence, b.views[i].confidence));
-    EXPECT_TRUE(same_bits(a.views[i].reasons, b.views[i].reasons));
-  }
-}
-
 TEST(CudaMatch, BitsDependNeitherOnGraphsNorOnSplitting) {
   OPEN_DEVICE_OR_SKIP(device, "cuda");
   const RenderedPair pair = render_demo(65);
   for (const Options& options : every_method()) {
     Matcher matcher(*device, pair.rig, options);
     const StereoResult first = matcher.match(images_of(pair));
-    expect_same(first, matcher.match(images_of(pair)));  // the same graph again
+    expect_same_bits(first, matcher.match(images_of(pair)));  // the same graph again
     double done = 0;
     const StereoResult watched =
         matcher.match(images_of(pair), [&done](double share) { done = share; });
     EXPECT_DOUBLE_EQ(done, 1);
-    expect_same(first, watched);
-    expect_same(first, matcher.match(images_of(pair)));
+    expect_same_bits(first, watched);
+    expect_same_bits(first, matcher.match(images_of(pair)));
     Device splitting = open_validated("cuda", 5000);
-    expect_same(first, Matcher(splitting, pair.rig, options).match(images_of(pair)));
+    expect_same_bits(first, Matcher(splitting, pair.rig, options).match(images_of(pair)));
   }
 }
 
@@ -93,7 +80,7 @@ TEST(CudaMatch, TimesEveryKernelInBothWaysAndTurns) {
     EXPECT_GT(graph.device_bytes, 128u * 128u * 2u * 68u);
     matcher.time_kernels(false);
     const StereoResult untimed = matcher.match(images_of(pair));
-    expect_same(untimed, graph);
+    expect_same_bits(untimed, graph);
     EXPECT_GT(untimed.device_milliseconds, 0);
     EXPECT_LT(untimed.device_milliseconds, untimed.milliseconds);
     ASSERT_EQ(untimed.times.size(), graph.times.size());
@@ -107,7 +94,7 @@ TEST(CudaMatch, AnAbortedRunLeavesTheMatcherUsable) {
   Matcher matcher(*device, pair.rig, every_method()[0]);
   const StereoResult first = matcher.match(images_of(pair));
   EXPECT_THROW(matcher.match(images_of(pair), [](double) { throw Error("stop"); }), Error);
-  expect_same(first, matcher.match(images_of(pair)));
+  expect_same_bits(first, matcher.match(images_of(pair)));
 }
 
 TEST(CudaMatch, MatchersLeaveNoMemoryBehind) {
@@ -276,7 +263,7 @@ class CudaSequence : public ::testing::Test {
   CudaSequence()
       : size_(side, side), left_(size_, CV_32FC1), right_(size_, CV_32FC1), maps_(size_) {
     for (int k = 0; k < 3; ++k) {
-      const RenderedPair pair = render_demo_from(pose(k), side);
+      const RenderedPair pair = render_demo_from(pose_after(k), side);
       rig_ = pair.rig;
       std::vector<cv::Mat>& images = frames_.emplace_back();
       for (const RenderedView& view : pair.views)
@@ -287,13 +274,8 @@ class CudaSequence : public ::testing::Test {
     for (View& view : rig_.views) view.world_from_camera = turned * view.world_from_camera;
     for (Eigen::Isometry3d* motion : {&motions_[0], &motions_[1]}) {
       const int k = motion == &motions_[0] ? 1 : 2;
-      *motion = turned * pose(k).inverse() * pose(k - 1) * turned.inverse();
+      *motion = turned * pose_after(k).inverse() * pose_after(k - 1) * turned.inverse();
     }
-  }
-
-  static Eigen::Isometry3d pose(int k) {
-    return Eigen::Translation3d(0.05 * k, -0.01 * k, 0.02 * k) *
-           Eigen::AngleAxisd(0.035 * k, Eigen::Vector3d(0.2, 1, 0.1).normalized());
   }
 
   void upload(int frame) {

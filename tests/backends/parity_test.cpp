@@ -10,7 +10,9 @@
 #include "device_fixture.h"
 #include "geometry/camera_parameters.h"
 #include "kernel/kernel_fixture.h"
+#include "match_fixture.h"
 #include "matching/backend.h"
+#include "same_bits.h"
 #include "widestereo/image_io.h"
 #include "widestereo/matcher.h"
 #include "widestereo/synthesis.h"
@@ -35,12 +37,6 @@ Options small_options() {
   return options;
 }
 
-std::vector<cv::Mat> images_of(const RenderedPair& pair) {
-  std::vector<cv::Mat> images;
-  for (const RenderedView& view : pair.views) images.push_back(view.image);
-  return images;
-}
-
 /// Ties and failures differ; where both are sure of themselves their distances must agree.
 void expect_agreement(const ViewResult& expected, const ViewResult& actual, double tolerance) {
   const cv::Mat sure = (expected.reasons == 0) & (actual.reasons == 0);
@@ -55,8 +51,7 @@ void expect_agreement(const ViewResult& expected, const ViewResult& actual, doub
 /// With the rays and the images.
 std::unique_ptr<Backend> make_backend(Device& device, const Schedule& schedule,
                                       const RenderedPair& pair) {
-  std::vector<cv::Size> sizes;
-  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  const std::vector<cv::Size> sizes = sizes_of(schedule.views);
   auto backend = device.implementation().make_backend(sizes, schedule.constants);
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const int view = static_cast<int>(i);
@@ -87,12 +82,6 @@ std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& 
     hypotheses.push_back(backend->hypotheses(i));
   }
   return hypotheses;
-}
-
-void expect_same_bits(const ViewResult& expected, const ViewResult& actual) {
-  EXPECT_EQ(cv::norm(expected.hypotheses, actual.hypotheses, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(expected.confidence, actual.confidence, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(expected.reasons, actual.reasons, cv::NORM_INF), 0);
 }
 
 class Parity : public ::testing::TestWithParam<const char*> {};
@@ -296,7 +285,7 @@ TEST_P(Parity, EveryCameraModelGivesTheBitsOfTheCpu) {
     cv::Mat costs;
     cv::extractChannel(expected, costs, 3);
     EXPECT_GT(cv::countNonZero(costs < INVALID_COST), 1000);
-    EXPECT_EQ(cv::norm(expected, actual, cv::NORM_INF), 0);
+    EXPECT_TRUE(same_bits(expected, actual));
   }
   expect_no_validation_messages(*device);
 }
@@ -367,11 +356,9 @@ TEST_P(EveryDevice, FindsTheDemoSceneTwiceWithTheSameBits) {
                                    (differences[1] > options.consistency_pixels));
     const cv::Mat inconsistent = (first.views[view].reasons & reason_inconsistent) != 0;
     EXPECT_GT(cv::countNonZero(inconsistent), 0);
-    EXPECT_EQ(cv::norm(too_large, inconsistent, cv::NORM_INF), 0);
-    EXPECT_EQ(cv::norm(first.views[view].hypotheses, second.views[view].hypotheses, cv::NORM_INF),
-              0);
-    EXPECT_EQ(cv::norm(first.views[view].confidence, second.views[view].confidence, cv::NORM_INF),
-              0);
+    EXPECT_TRUE(same_bits(too_large, inconsistent));
+    EXPECT_TRUE(same_bits(first.views[view].hypotheses, second.views[view].hypotheses));
+    EXPECT_TRUE(same_bits(first.views[view].confidence, second.views[view].confidence));
     const std::vector<RegionScores> scores =
         evaluate(first.views[view].distance, first.views[view].normals, pair.views[view].truth,
                  pair.rig.views[view], pair.rig.views[1 - view]);
@@ -527,7 +514,7 @@ TEST_P(EveryDevice, PyramidBeatsRandomSearchWithAFractionOfTheWork) {
   EXPECT_LT(scores_of(of_fast).bad_pixels.at(0.5), scores_of(of_random).bad_pixels.at(0.5));
   EXPECT_LT(scores_of(of_fast).median_normal_angle, 0.5 * scores_of(of_random).median_normal_angle);
   const StereoResult again = Matcher(*device, pair.rig, fast).match(images_of(pair));
-  EXPECT_EQ(cv::norm(of_fast.views[0].hypotheses, again.views[0].hypotheses, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(of_fast.views[0].hypotheses, again.views[0].hypotheses));
   expect_no_validation_messages(*device);
 }
 
@@ -628,10 +615,7 @@ TEST(Costs, AreThoseOfThePlanes) {
     options.warm_regressions = 2;
     KernelFixture match(fisheye_rig(side), options);
     const Schedule& schedule = match.schedule();
-    std::vector<cv::Size> sizes;
-    for (const View& view : schedule.views) {
-      sizes.emplace_back(view.camera.width, view.camera.height);
-    }
+    const std::vector<cv::Size> sizes = sizes_of(schedule.views);
     const Device cpu = Device::open("cpu");
     const auto backend = cpu.implementation().make_backend(sizes, schedule.constants);
     for (std::size_t i = 0; i < sizes.size(); ++i) {
@@ -703,10 +687,20 @@ TEST(Launches, OverSeveralViewsMayRunThemInAnyOrder) {
       }
     }
     for (int view = 0; view < 2; ++view) {
-      EXPECT_EQ(cv::norm(backends[0]->hypotheses(view), backends[1]->hypotheses(view)), 0);
-      EXPECT_EQ(cv::norm(backends[0]->checks(view), backends[1]->checks(view)), 0);
+      EXPECT_TRUE(same_bits(backends[0]->hypotheses(view), backends[1]->hypotheses(view)));
+      EXPECT_TRUE(same_bits(backends[0]->checks(view), backends[1]->checks(view)));
     }
   }
+}
+
+TEST(KernelTimes, AreTakenOnTheCpuInAnyCase) {
+  const RenderedPair pair = render_demo(64);
+  Device device = Device::open("cpu");
+  Matcher matcher(device, pair.rig, small_options());
+  matcher.time_kernels(false);
+  const std::vector<KernelTime> times = matcher.match(images_of(pair)).times;
+  ASSERT_FALSE(times.empty());
+  for (const KernelTime& time : times) EXPECT_GT(time.milliseconds, 0) << time.kernel;
 }
 
 TEST(Checkerboard, ReachesRasterOrder) {
@@ -732,7 +726,7 @@ TEST(AcceptedDistance, IsThatOfPixelsThatAreNotRejectedOrFilledAllTheSame) {
   view.distance = (cv::Mat_<float>(1, 3) << 1, 2, 3);
   view.reasons = (cv::Mat_<std::uint16_t>(1, 3) << 0, reason_tilt, reason_tilt | reason_filled);
   const cv::Mat expected = (cv::Mat_<float>(1, 3) << 1, 0, 3);
-  EXPECT_EQ(cv::norm(accepted_distance(view), expected), 0);
+  EXPECT_TRUE(same_bits(accepted_distance(view), expected));
 }
 
 TEST(DeviceChoice, UnknownNamesAreErrors) {

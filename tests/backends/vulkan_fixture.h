@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <cstring>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -33,29 +32,35 @@ namespace widestereo::test {
     }                                                                              \
   } while (false)
 
-/// Two views of different sizes, which also are no multiples of a workgroup, through every kernel.
-inline KernelFixture small_match() {
-  Rig rig = fisheye_rig(45);
-  rig.views[1].camera = fisheye_camera(38);
-  Options options;
+/// Cold and warm matches with the presets paper and fast together have every kernel.
+inline Options options_of_small_match(const std::string& preset) {
+  Options options = Options::preset_named(preset);
   options.min_distance = 0.3;
   options.max_distance = 10;
   options.window_radius = 2;
   options.first_iterations = 2;
   options.second_iterations = 1;
-  return KernelFixture(std::move(rig), options);
+  if (preset == "fast") {
+    options.ambiguity_margin = 0.2;
+    options.fill_radius = 4;
+  }
+  return options;
 }
 
-inline std::vector<cv::Size> sizes_of(const Rig& rig) {
-  std::vector<cv::Size> sizes;
-  for (const View& view : rig.views) sizes.emplace_back(view.camera.width, view.camera.height);
-  return sizes;
+/// Two views of different sizes, which also are no multiples of a workgroup.
+inline KernelFixture small_match(const std::string& preset = "paper") {
+  Rig rig = fisheye_rig(45);
+  rig.views[1].camera = fisheye_camera(38);
+  return KernelFixture(std::move(rig), options_of_small_match(preset));
 }
 
 inline void upload(Backend& backend, KernelFixture& match) {
-  for (int i = 0; i < static_cast<int>(match.rig().views.size()); ++i) {
-    backend.set_rays(i, match.view(i).rays);
-    backend.set_intensity(i, match.view(i).image());
+  const std::vector<View>& views = match.schedule().views;
+  for (int i = 0; i < static_cast<int>(views.size()); ++i) {
+    backend.set_rays(i, ray_image(views[i].camera, views[i].mask));
+    if (i < static_cast<int>(match.rig().views.size())) {
+      backend.set_intensity(i, match.view(i).image());
+    }
   }
 }
 
@@ -77,13 +82,9 @@ inline cv::Mat run(Backend& backend, KernelFixture& match) {
 }
 
 inline cv::Mat run(Device::Implementation& device, KernelFixture& match) {
-  const auto backend = device.make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device.make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   return run(*backend, match);
-}
-
-inline bool same_bits(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
-         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
 /// Parts of an application that has a device of its own.

@@ -7,7 +7,9 @@
 #include <limits>
 
 #include "device_fixture.h"
+#include "match_fixture.h"
 #include "pixel_fixture.h"
+#include "same_bits.h"
 #include "vulkan/memory.h"
 #include "vulkan_fixture.h"
 #include "widestereo/matcher.h"
@@ -174,6 +176,7 @@ class ApplicationMaps {
       const ViewResult& view = expected.views[i];
       expect_rounded_distances(distance(i), view);
       EXPECT_TRUE(same_bits(distance(i), view.distance) || !distances_have_same_bits_) << i;
+      EXPECT_TRUE(cv::checkRange(map(i, 1, CV_32FC3)) && cv::checkRange(view.normals)) << i;
       EXPECT_LT(cv::norm(map(i, 1, CV_32FC3), view.normals, cv::NORM_INF), 1e-6) << i;
       EXPECT_TRUE(same_bits(map(i, 2, CV_32FC1), view.cost)) << i;
       EXPECT_TRUE(same_bits(map(i, 3, CV_32FC1), view.confidence)) << i;
@@ -481,18 +484,15 @@ TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
   REQUIRE_VULKAN_OR_SKIP();
   Application application;
   Device device = Device::open("vulkan:0");
-  const auto pose = [](int k) {
-    return Eigen::Isometry3d(Eigen::Translation3d(0.05 * k, -0.01 * k, 0.02 * k));
-  };
   const Options options = small_options("fast");
-  const Rig rig = render_demo_from(pose(0), side).rig;
+  const Rig rig = render_demo_from(pose_after(0), side).rig;
   Matcher expected(device, rig, options);
   VulkanMatcher matcher(application.context.handles(), rig, options);
   ApplicationBuffers memory(application.context, PixelType::grey8);
   const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
   for (int k = 0; k < 3; ++k) {
     const std::vector<cv::Mat> images =
-        device_images_of(render_demo_from(pose(k), side), PixelType::grey8);
+        device_images_of(render_demo_from(pose_after(k), side), PixelType::grey8);
     memory.set(images);
     Commands commands(application.context);
     if (k == 0) {
@@ -502,7 +502,8 @@ TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
       memory.expect_equal(expected.match(images));
       continue;
     }
-    const WarmStart start{.now_from_previous = pose(k).inverse() * pose(k - 1), .frame = k};
+    const WarmStart start{.now_from_previous = pose_after(k).inverse() * pose_after(k - 1),
+                          .frame = k};
     matcher.record_next(commands.get(), bindings, start);
     commands.end();
     commands.run();

@@ -7,8 +7,11 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
+#include "bytes_of.h"
 #include "device_fixture.h"
+#include "same_bits.h"
 #include "schedule/bands.h"
 #include "vulkan/physical_device.h"
 #include "vulkan/vulkan_backend.h"
@@ -76,9 +79,36 @@ TEST(VulkanDevices, MissingIndexIsAnError) {
 
 TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
   REQUIRE_VULKAN_OR_SKIP();
+  const auto device = open_vulkan_device(0, validated());
+  std::set<std::string> have_run;
+  for (const char* preset : {"paper", "fast"}) {
+    SCOPED_TRACE(preset);
+    KernelFixture match = small_match(preset);
+    const Schedule& cold = match.schedule();
+    const auto backend = device->make_backend(sizes_of(cold.views), cold.constants);
+    upload(*backend, match);
+    Schedule warm = make_warm_schedule(match.rig(), options_of_small_match(preset));
+    set_motion(warm, match.rig(), Eigen::Isometry3d::Identity(), 1);
+    for (const Schedule& schedule : {cold, warm}) {
+      backend->run(schedule, {});
+      for (const KernelTime& time : backend->times()) have_run.insert(time.kernel);
+    }
+    EXPECT_LT(cv::Mat_<cv::Vec4f>(backend->hypotheses(1))(19, 19)[3], INVALID_COST);
+  }
+  for (int i = 0; i < kernel_count; ++i) {
+    const auto kernel = static_cast<Kernel>(i);
+    EXPECT_EQ(have_run.contains(to_string(kernel)), kernel != Kernel::iterate_raster)
+        << to_string(kernel);
+  }
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
+TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
+  REQUIRE_VULKAN_OR_SKIP();
   const auto device = open_vulkan_device(0, validated(20000));
   KernelFixture match = small_match();
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   upload(*backend, match);
   std::vector<double> shares;
   backend->run(match.schedule(), [&](double share) { shares.push_back(share); });
@@ -105,7 +135,8 @@ TEST(VulkanMatch, KernelsNeedNotBeTimed) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   const cv::Mat timed = run(*backend, match);
   const std::vector<KernelTime> times = backend->times();
   double sum = 0;
@@ -136,7 +167,8 @@ TEST(VulkanMatch, AMatcherCanRunAgain) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   const cv::Mat first = run(*backend, match);
   EXPECT_TRUE(same_bits(first, run(*backend, match)));
   EXPECT_THAT(device->validation_messages(), IsEmpty());
@@ -148,7 +180,8 @@ TEST(VulkanMatch, ARunAbortedAtAnyCallbackLeavesTheMatcherUsable) {
   const FaultyLoader::Scope scope;
   const auto device =
       open_vulkan_device(0, validated(5000), FaultyLoader::get_instance_proc_addr());
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   const cv::Mat expected = run(*backend, match);
   for (const int last : {1, 2, 3}) {
     int callbacks = 0;
@@ -172,8 +205,8 @@ TEST(VulkanMatch, TexturesAndStorageImagesGiveTheSameBits) {
   match.schedule().constants.filter = static_cast<int>(Filter::exact);
   std::vector<cv::Mat> results;
   for (const bool sampled : {false, true}) {
-    VulkanBackend backend(application.context, sizes_of(match.rig()), match.schedule().constants,
-                          application.cache, {.sampled = sampled});
+    VulkanBackend backend(application.context, sizes_of(match.schedule().views),
+                          match.schedule().constants, application.cache, {.sampled = sampled});
     results.push_back(run(backend, match));
   }
   EXPECT_TRUE(same_bits(results[0], results[1]));
@@ -188,7 +221,7 @@ TEST(VulkanMatch, TextureUnitsFilterAsWellAsTheirPositions) {
   match.schedule().constants.texels_per_pixel = 2;   // positions are rounded to 1/512 pixel
   const auto costs = [&](const VulkanContext& context, Filter filter) {
     match.schedule().constants.filter = static_cast<int>(filter);
-    VulkanBackend backend(context, sizes_of(match.rig()), match.schedule().constants,
+    VulkanBackend backend(context, sizes_of(match.schedule().views), match.schedule().constants,
                           application.cache, {.sampled = true});
     return std::pair(run(backend, match), static_cast<double>(backend.device_bytes()));
   };
@@ -222,7 +255,8 @@ TEST(VulkanMatch, RecordsIntoAnApplicationsCommandBuffer) {
   const VulkanContext adopted(application.context.handles());
   PipelineCache cache(adopted, {});
   KernelFixture match = small_match();
-  VulkanBackend backend(adopted, sizes_of(match.rig()), match.schedule().constants, cache);
+  VulkanBackend backend(adopted, sizes_of(match.schedule().views), match.schedule().constants,
+                        cache);
   const cv::Mat expected = run(backend, match);
   const cv::Mat nothing(match.view(0).rays.size(), CV_32FC4, cv::Scalar::all(0));
   backend.set_hypotheses(0, nothing);
@@ -310,7 +344,8 @@ TEST(VulkanMatch, LeavesNoObjectBehind) {
                                 instance.physical_devices().at(0));
     PipelineCache cache(context, {});
     KernelFixture match = small_match();
-    VulkanBackend backend(context, sizes_of(match.rig()), match.schedule().constants, cache);
+    VulkanBackend backend(context, sizes_of(match.schedule().views), match.schedule().constants,
+                          cache);
     run(backend, match);
   }
   // The layer names every object that outlives its device.
@@ -321,7 +356,8 @@ TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, {});
-  const auto backend = device->make_backend(sizes_of(match.rig()), match.schedule().constants);
+  const auto backend =
+      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   EXPECT_THAT(error_of([&] { backend->set_rays(1, match.view(0).rays); }), HasSubstr("38x38"));
   EXPECT_THAT(error_of([&] { backend->set_intensity(0, match.view(0).rays); }),
               HasSubstr("CV_32FC1"));
@@ -530,10 +566,7 @@ class VulkanCache : public ::testing::Test {
     Application application(false);
     return PipelineCache(application.context, path_).loaded_from_file();
   }
-  std::string content() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string content() const { return bytes_of(path_); }
   void overwrite(const std::string& content) const {
     std::ofstream(path_, std::ios::binary) << content;
   }

@@ -12,6 +12,8 @@
 #include "device_fixture.h"
 #include "error_of.h"
 #include "kernel/host.h"
+#include "match_fixture.h"
+#include "same_bits.h"
 #include "widestereo/matcher.h"
 #include "widestereo/motion.h"
 #include "widestereo/synthesis.h"
@@ -23,13 +25,7 @@ using ::testing::HasSubstr;
 
 constexpr int size = 96;
 
-/// Camera 0 to world after steps of 5 cm and two degrees, about a pixel each.
-Eigen::Isometry3d pose_after(double steps) {
-  return Eigen::Translation3d(0.05 * steps, -0.01 * steps, 0.02 * steps) *
-         Eigen::AngleAxisd(0.035 * steps, Eigen::Vector3d(0.2, 1, 0.1).normalized());
-}
-
-/// Camera 0 to world of frame `k`.
+/// Camera 0 to world of frame `k`, about three pixels from one to the next.
 Eigen::Isometry3d pose(int k) { return pose_after(3 * k); }
 
 Eigen::Isometry3d motion_to(int k) { return pose(k).inverse() * pose(k - 1); }
@@ -40,10 +36,6 @@ const RenderedPair& frame(int k) {
   auto& rendered = frames.at(static_cast<std::size_t>(k));
   if (!rendered) rendered = render_demo_from(pose(k), size);
   return *rendered;
-}
-
-std::vector<cv::Mat> images_of(const RenderedPair& pair) {
-  return {pair.views[0].image, pair.views[1].image};
 }
 
 Options options_of(const std::string& preset) {
@@ -57,8 +49,6 @@ RegionScores scores_of(const StereoResult& result, const RenderedPair& truth) {
   return evaluate(result.views[0].distance, result.views[0].normals, truth.views[0].truth,
                   truth.rig.views[0], truth.rig.views[1])[1];
 }
-
-bool same_bits(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
 
 class WarmStarts : public ::testing::TestWithParam<const char*> {};
 

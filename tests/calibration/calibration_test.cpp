@@ -7,23 +7,28 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <set>
 
+#include "bytes_of.h"
 #include "comma_locale.h"
 #include "damaged_texts.h"
 #include "data_folder.h"
 #include "error_of.h"
+#include "geometry/named_cameras.h"
+#include "replaced.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
 
+using test::bytes_of;
+using test::replaced;
 using test::TemporaryFolder;
 
 const char* const kalibr_text = R"(cam0:
@@ -93,12 +98,6 @@ T: !!opencv-matrix
 image_width: 1280
 image_height: 960
 )";
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 /// X y z are z x y in the camera, which the IMU is beside.
 const char* const beside_imu = R"(:
@@ -215,13 +214,8 @@ TEST(Kalibr, ReadsPosesThatOnlyTheImuGives) {
   Rig to_imu = rig;
   to_imu.world_from_imu = camera_beside_imu();
   write_kalibr(folder / "both.yaml", to_imu);
-  std::string text;
-  {
-    std::ifstream stream(folder / "both.yaml");
-    text.assign(std::istreambuf_iterator<char>(stream), {});
-  }
-  const Rig again =
-      read_calibration(folder.write("imu.yaml", replaced(text, "T_cn_cnm1", "unused"))).rig;
+  const std::string text = replaced(bytes_of(folder / "both.yaml"), "T_cn_cnm1", "unused");
+  const Rig again = read_calibration(folder.write("imu.yaml", text)).rig;
   EXPECT_LT(
       (again.views[1].world_from_camera.matrix() - rig.views[1].world_from_camera.matrix()).norm(),
       1e-9);
@@ -538,6 +532,18 @@ TEST(Locales, DoNotChangeNumbers) {
   round_trip();
 }
 
+void expect_same_camera(const Camera& found, const Camera& expected) {
+  EXPECT_EQ(found.model, expected.model);
+  EXPECT_EQ(found.width, expected.width);
+  EXPECT_EQ(found.height, expected.height);
+  EXPECT_NEAR(found.max_theta, expected.max_theta, 1e-14);  // degrees in files
+  // Basalt's ucm has another parameter than ours and other focal lengths.
+  const double rounding = expected.model == CameraModel::unified ? 4e-15 : 0;
+  for (const auto& [name, member] : intrinsics()) {
+    EXPECT_NEAR(found.*member, expected.*member, rounding * std::abs(expected.*member)) << name;
+  }
+}
+
 TEST(Writing, RoundTripsExactly) {
   const TemporaryFolder folder;
   Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
@@ -546,15 +552,7 @@ TEST(Writing, RoundTripsExactly) {
     ASSERT_EQ(again.world_from_imu.has_value(), rig.world_from_imu.has_value());
     if (rig.world_from_imu) expect_imu(again, *rig.world_from_imu);
     for (std::size_t i = 0; i < rig.views.size(); ++i) {
-      const Camera& a = rig.views[i].camera;
-      const Camera& b = again.views[i].camera;
-      EXPECT_EQ(a.model, b.model);
-      EXPECT_NEAR(a.fx, b.fx, 1e-12);
-      EXPECT_NEAR(a.cy, b.cy, 1e-12);
-      EXPECT_NEAR(a.xi, b.xi, 1e-12);
-      EXPECT_NEAR(a.k3, b.k3, 1e-12);
-      EXPECT_NEAR(a.max_theta, b.max_theta, 1e-12);
-      EXPECT_EQ(a.height, b.height);
+      expect_same_camera(again.views[i].camera, rig.views[i].camera);
       EXPECT_LT(
           (rig.views[i].world_from_camera.matrix() - again.views[i].world_from_camera.matrix())
               .norm(),
@@ -571,6 +569,63 @@ TEST(Writing, RoundTripsExactly) {
     same(json.rig);
   }
 }
+
+/// Kalibr's format and Basalt's hold a camera as it is, or name what they cannot hold.
+class WritingCameras : public ::testing::TestWithParam<test::NamedCamera> {
+ protected:
+  using Write = void (*)(const std::filesystem::path&, const Rig&);
+
+  void expect_held(bool is_held, Write write) {
+    const Camera& camera = GetParam().camera;
+    Rig rig;
+    rig.views.resize(2);
+    for (int i = 0; i < 2; ++i) {
+      rig.views[i].name = "cam" + std::to_string(i);
+      rig.views[i].camera = camera;
+    }
+    rig.views[1].camera.max_theta = 1.1;
+    rig.views[1].world_from_camera = camera_beside_imu();
+    const std::filesystem::path path = folder_ / "rig";
+    if (!is_held) {
+      EXPECT_NE(test::error_of([&] { write(path, rig); }).find("cam0"), std::string::npos);
+      EXPECT_FALSE(std::filesystem::exists(path));
+      return;
+    }
+    write(path, rig);
+    const Rig again = read_calibration(path).rig;
+    ASSERT_EQ(again.views.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      expect_same_camera(again.views[i].camera, rig.views[i].camera);
+      EXPECT_LT(
+          (again.views[i].world_from_camera.matrix() - rig.views[i].world_from_camera.matrix())
+              .norm(),
+          1e-14);
+    }
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_P(WritingCameras, AsKalibrDoes) {
+  const Camera& c = GetParam().camera;
+  const std::set<CameraModel> has_no_form = {
+      CameraModel::pinhole_rational, CameraModel::thin_prism_fisheye,
+      CameraModel::rad_tan_thin_prism_fisheye, CameraModel::polynomial_fisheye};
+  const bool is_radtan = c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei;
+  expect_held(!has_no_form.contains(c.model) && c.skew == 0 && !(is_radtan && c.k3 != 0),
+              write_kalibr);
+}
+
+TEST_P(WritingCameras, AsBasaltDoes) {
+  const Camera& c = GetParam().camera;
+  const std::set<CameraModel> has_no_form = {
+      CameraModel::mei, CameraModel::equirectangular, CameraModel::thin_prism_fisheye,
+      CameraModel::rad_tan_thin_prism_fisheye, CameraModel::polynomial_fisheye};
+  expect_held(!has_no_form.contains(c.model) && c.skew == 0 && c.s1 == 0, write_basalt);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, WritingCameras, ::testing::ValuesIn(test::cameras()),
+                         [](const auto& test) { return std::string(test.param.name); });
 
 /// Of names that it looks for, Basalt refuses a file that lacks one.
 TEST(Writing, BasaltFindsWhatItAsksFor) {

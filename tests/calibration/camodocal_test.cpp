@@ -9,12 +9,14 @@
 
 #include "damaged_texts.h"
 #include "error_of.h"
+#include "replaced.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
 
 namespace widestereo {
 namespace {
 
+using test::replaced;
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
 
@@ -192,9 +194,6 @@ TEST_F(Vins, ReadsTheRig) {
 TEST_F(Vins, WhatIsWrongIsOneSentence) {
   const std::string good = vins();
   EXPECT_EQ(error(good), "");
-  const auto replaced = [](std::string text, const std::string& what, const std::string& with) {
-    return text.replace(text.find(what), what.size(), with);
-  };
   EXPECT_THAT(error(vins("num_of_cam: 1\n")), HasSubstr("config.yaml: The key num_of_cam says 1"));
   EXPECT_THAT(error(replaced(good, "body_T_cam1", "T_cam1")), HasSubstr("The key body_T_cam1"));
   EXPECT_THAT(error(replaced(good, "cam0_mei.yaml", "cam2.yaml")),

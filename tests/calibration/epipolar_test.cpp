@@ -57,6 +57,8 @@ TEST(Epipolar, ExactMatchesHaveNoErrorAndTheirDistances) {
   EXPECT_EQ(report.matches, 400);
   EXPECT_LT(report.median_pixels, 1e-6);
   EXPECT_EQ(report.below_1_pixel, 1);
+  EXPECT_EQ(report.below_5_pixels, 1);
+  EXPECT_EQ(report.behind, 0);
   EXPECT_GT(report.nearest, 1.1);
   EXPECT_LT(report.farthest, 3.6);
   EXPECT_GT(report.typical, report.nearest);
@@ -71,6 +73,30 @@ TEST(Epipolar, MeasuresAKnownRotationError) {
   EXPECT_LT(report.median_degrees, 1.01);
   EXPECT_GT(report.median_pixels, 1);
   EXPECT_LT(report.median_pixels, 4);
+}
+
+TEST(Epipolar, TellsHowManyMatchesAreOffAndHowManyLieBehind) {
+  const Rig rig = rig_with_rotation_error(0);
+  std::vector<PixelMatch> matches = exact_matches(rig);
+  // Across epipolar lines, which are horizontal near the middle: a quarter by 3 pixels, a quarter
+  // by 7.
+  std::erase_if(matches, [](const PixelMatch& match) {
+    return (match.second - Eigen::Vector2d(255, 255)).norm() > 60;
+  });
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (i % 4 < 2) matches[i].second.y() += i % 4 == 0 ? 3 : 7;
+  }
+  const double one = 1.0 / static_cast<double>(matches.size());
+  const EpipolarReport report = check_epipolar(rig.views[0], rig.views[1], matches);
+  EXPECT_NEAR(report.below_1_pixel, 0.5, one);
+  EXPECT_NEAR(report.below_5_pixels, 0.75, one);
+  EXPECT_EQ(report.behind, 0);
+
+  matches = exact_matches(rig);
+  for (std::size_t i = 0; i < matches.size(); i += 4) {
+    std::swap(matches[i].first, matches[i].second);
+  }
+  EXPECT_EQ(check_epipolar(rig.views[0], rig.views[1], matches).behind, 0.25);
 }
 
 TEST(Epipolar, LeavesOutWhatIsMasked) {

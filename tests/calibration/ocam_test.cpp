@@ -12,6 +12,7 @@
 
 #include "damaged_texts.h"
 #include "error_of.h"
+#include "replaced.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
 
@@ -20,14 +21,11 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using test::replaced;
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
 
 constexpr double degree = std::numbers::pi / 180;
-
-std::string replaced(std::string text, const std::string& what, const std::string& with) {
-  return text.replace(text.find(what), what.size(), with);
-}
 
 /// Of OmniMVS's lens of 220 degrees, with a pixel's row before its column as in all of OCamCalib.
 constexpr std::array<double, 5> polynomial = {-392.22, 0, 1.2707685e-3, -1.7456027e-6,

@@ -3,12 +3,14 @@
 #include <nlohmann/json.hpp>
 
 #include "command_fixture.h"
+#include "same_bits.h"
 
 namespace widestereo {
 namespace {
 
 using test::Outcome;
 using test::run;
+using test::same_bits;
 
 /// The pair as COLMAP would have registered it, and the same calibration for Kalibr.
 class ColmapCommand : public test::Command {
@@ -70,7 +72,7 @@ TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
   ASSERT_EQ(kalibr.exit_code, 0) << kalibr.output;
   EXPECT_EQ(record_of("out")["conventions"]["unit"], "metre");
   ASSERT_GT(cv::countNonZero(distance_in("out")), 5000);
-  EXPECT_EQ(cv::norm(distance_in("colmap"), distance_in("out"), cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(distance_in("colmap"), distance_in("out")));
 }
 
 TEST_F(ColmapCommand, OneImageIsJoinedByTheBestOthers) {
@@ -79,7 +81,7 @@ TEST_F(ColmapCommand, OneImageIsJoinedByTheBestOthers) {
   const Outcome joined = run(one);
   ASSERT_EQ(joined.exit_code, 0) << joined.output;
   ASSERT_EQ(run(depth("model", "colmap")).exit_code, 0);
-  EXPECT_EQ(cv::norm(distance_in("one"), distance_in("colmap"), cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(distance_in("one"), distance_in("colmap")));
   expect_error("depth " + file("left.png") + " -c " + file("same.yaml") + " -o " + file("out"),
                "One image is not enough");
   expect_error("depth " + file("away.png") + " -c " + file("model") + " -o " + file("out"),
@@ -169,9 +171,9 @@ TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
                 " --window-radius 2")
                 .exit_code,
             0);
-  EXPECT_EQ(cv::norm(distance_in("out/left.png"), distance_in("pair"), cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(distance_in("out/left.png"), distance_in("pair")));
   const cv::Mat second = cv::imread(file("pair/distance1.tiff"), cv::IMREAD_UNCHANGED);
-  EXPECT_EQ(cv::norm(distance_in("out/right/1.png"), second, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(distance_in("out/right/1.png"), second));
   const auto points = record()["cloud"]["points"].get<std::size_t>();
   const cv::Mat accepted = cv::imread(file("pair/distance_accepted0.tiff"), cv::IMREAD_UNCHANGED);
   EXPECT_GT(points, 0.3 * cv::countNonZero(accepted));
@@ -350,9 +352,8 @@ TEST_F(TransformsCommand, TakesATransformsFile) {
   const Outcome outcome = run(with_transforms + range);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   for (const char* image : {"left.png", "right/1.png"}) {
-    EXPECT_EQ(cv::norm(distance_in("out/" + std::string(image)),
-                       distance_in("colmap/" + std::string(image)), cv::NORM_INF),
-              0);
+    EXPECT_TRUE(same_bits(distance_in("out/" + std::string(image)),
+                          distance_in("colmap/" + std::string(image))));
   }
   EXPECT_EQ(record_of("out/left.png")["conventions"]["unit"], "that of the reconstruction");
   expect_error("calibration show " + file("images/transforms.json"),
@@ -387,7 +388,7 @@ TEST_F(TransformsCommand, ImagesMayLieOutsideOfTheFolder) {
                             " --preset paper --device cpu --iterations 2 --second-iterations 1"
                             " --window-radius 2");
   ASSERT_EQ(depth.exit_code, 0) << depth.output;
-  EXPECT_EQ(cv::norm(distance_in("out/images/right/1.png"), distance_in("pair"), cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(distance_in("out/images/right/1.png"), distance_in("pair")));
 }
 
 TEST_F(ReconstructCommand, FoldersOfOthersAreLeftAlone) {

@@ -13,7 +13,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <utility>
 
+#include "bytes_of.h"
+#include "data_folder.h"
 #include "temporary_folder.h"
 
 namespace widestereo::test {
@@ -25,10 +28,39 @@ struct Outcome {
   std::string output;  ///< standard output and error
 };
 
+/// A text as a word of the shell, or part of one.
+inline std::string shell_word(const std::string& text) {
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
+  return word + "'";
+}
+
+/// Arguments have paths as they are: what they have of folders that tests do not name, which may
+/// have spaces, is quoted here.
+inline std::string with_quoted_folders(const std::string& arguments) {
+  // Either may be within the other one.
+  std::array folders = {fs::temp_directory_path().string(), data_folder().string()};
+  if (folders[0].size() < folders[1].size()) std::swap(folders[0], folders[1]);
+  std::string words;
+  for (std::size_t at = 0; at < arguments.size();) {
+    const auto folder = std::find_if(folders.begin(), folders.end(), [&](const std::string& path) {
+      return !path.empty() && arguments.compare(at, path.size(), path) == 0;
+    });
+    if (folder == folders.end()) {
+      words += arguments[at++];
+    } else {
+      words += shell_word(*folder);
+      at += folder->size();
+    }
+  }
+  return words;
+}
+
 inline Outcome run(const std::string& arguments, const std::string& environment = "") {
   // Leaks of drivers are not the command's.
-  const std::string command = environment + " ASAN_OPTIONS=detect_leaks=0 " WIDESTEREO_COMMAND " " +
-                              arguments + " 2>&1 < /dev/null";
+  const std::string command = environment + " ASAN_OPTIONS=detect_leaks=0 " +
+                              shell_word(WIDESTEREO_COMMAND) + " " +
+                              with_quoted_folders(arguments) + " 2>&1 < /dev/null";
   Outcome outcome;
   FILE* pipe = popen(command.c_str(), "r");
   if (pipe == nullptr) return outcome;
@@ -92,10 +124,7 @@ cam1:
 
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   /// Of a file in the folder, or of any by its whole path.
-  std::string bytes_of(const std::string& name) const {
-    std::ifstream stream(folder_ / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  std::string bytes_of(const std::string& name) const { return test::bytes_of(folder_ / name); }
   std::string depth_of(const std::string& left, const std::string& right,
                        const std::string& calibration = "calib.yaml") const {
     return "depth " + file(left) + " " + file(right) + " -c " + file(calibration) + " -o " +

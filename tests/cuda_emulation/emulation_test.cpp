@@ -13,6 +13,7 @@
 #include "error_of.h"
 #include "kernel/kernel_fixture.h"
 #include "matching/backend.h"
+#include "same_bits.h"
 #include "widestereo/cuda.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -150,8 +151,8 @@ TEST_F(CudaEmulation, TheOrderOfThreadsDoesNotMatter) {
         for (std::size_t i = 0; i < images.size(); ++i) {
           const ViewResult& expected = forwards[frame].views[i];
           const ViewResult& found = backwards[frame].views[i];
-          EXPECT_EQ(cv::norm(found.hypotheses, expected.hypotheses, cv::NORM_INF), 0);
-          EXPECT_EQ(cv::norm(found.confidence, expected.confidence, cv::NORM_INF), 0);
+          EXPECT_TRUE(same_bits(found.hypotheses, expected.hypotheses));
+          EXPECT_TRUE(same_bits(found.confidence, expected.confidence));
           EXPECT_GT(cv::countNonZero(expected.distance), 400);
         }
       }
@@ -171,7 +172,7 @@ TEST_F(CudaEmulation, AMatcherSurvivesAFailedRun) {
                 HasSubstr("Emulated GPU could not"));
     emulation().failing_call = -1;
     const StereoResult after = matcher.match(images_);
-    EXPECT_EQ(cv::norm(after.views[0].hypotheses, expected.views[0].hypotheses, cv::NORM_INF), 0);
+    EXPECT_TRUE(same_bits(after.views[0].hypotheses, expected.views[0].hypotheses));
   }
 }
 
@@ -188,8 +189,7 @@ TEST_F(CudaEmulation, AGraphIsMadeOnceForTheSameSchedule) {
 TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
   KernelFixture match(rig_, options_);
   Schedule schedule = match.schedule();
-  std::vector<cv::Size> sizes;
-  for (const View& view : schedule.views) sizes.emplace_back(view.camera.width, view.camera.height);
+  const std::vector<cv::Size> sizes = sizes_of(schedule.views);
   Device device = Device::open("cuda");
   const auto backend = device.implementation().make_backend(sizes, schedule.constants);
   for (int i = 0; i < static_cast<int>(sizes.size()); ++i) {
@@ -201,16 +201,16 @@ TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
   Schedule other = schedule;
   for (Dispatch& dispatch : other.dispatches) ++dispatch.pass.seed;
   backend->run(other, {});
-  EXPECT_GT(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  EXPECT_FALSE(same_bits(backend->hypotheses(0), expected));
   EXPECT_EQ(emulation().graphs_made, 2);
   other = schedule;
   other.parameters.range.z *= 2;
   backend->run(other, {});
   EXPECT_EQ(emulation().graphs_made, 3);
-  EXPECT_GT(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  EXPECT_FALSE(same_bits(backend->hypotheses(0), expected));
   backend->run(schedule, {});
   EXPECT_EQ(emulation().graphs_made, 3) << "other parameters need no other graph";
-  EXPECT_EQ(cv::norm(backend->hypotheses(0), expected, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(backend->hypotheses(0), expected));
   other.constants.window_radius = 4;
   EXPECT_THROW(backend->run(other, {}), Error);
 }

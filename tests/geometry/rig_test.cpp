@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 
+#include "error_of.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -26,12 +27,7 @@ Rig two_views() {
 }
 
 std::string message_of(const Rig& rig) {
-  try {
-    validate(rig, "rig.yaml");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { validate(rig, "rig.yaml"); });
 }
 
 TEST(RigValidation, AcceptsARig) { EXPECT_EQ(message_of(two_views()), ""); }
@@ -84,6 +80,21 @@ TEST(ResizedViews, ExcludePixelsThatCoverExcludedOnes) {
   EXPECT_THROW(resized(view, 0, 15), Error);
   view.mask = cv::Mat(48, 63, CV_8UC1, cv::Scalar(1));
   EXPECT_THROW(resized(view, 32, 24), Error);
+}
+
+TEST(Maps, HaveTheCalibratedSize) {
+  const View view = two_views().views[1];  // of 64x48 pixels
+  const auto error = [&view](int width, int height) {
+    return test::error_of(
+        [&] { require_calibrated_size(cv::Mat(height, width, CV_8UC1), view, "map.tiff"); });
+  };
+  EXPECT_EQ(error(64, 48), "");
+  for (const auto& [width, height] : {std::pair(48, 64), {63, 48}, {64, 49}}) {
+    EXPECT_EQ(error(width, height),
+              "map.tiff is " + std::to_string(width) + "x" + std::to_string(height) +
+                  " pixels, but the calibration of cam1 is for 64x48; use images of the "
+                  "calibrated size.");
+  }
 }
 
 TEST(Masks, ExcludeTheNearestPixelAndWhatIsOutside) {

@@ -16,8 +16,10 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "bytes_of.h"
 #include "comma_locale.h"
 #include "error_of.h"
+#include "same_bits.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -26,13 +28,10 @@
 namespace widestereo {
 namespace {
 
+using test::bytes_of;
 using test::error_of;
+using test::same_bits;
 using test::TemporaryFolder;
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 cv::Mat random_map(int type) {
   cv::Mat map(37, 53, type);
@@ -50,11 +49,7 @@ TEST(Maps, TiffAndPfmKeepEveryBit) {
     for (const char* name : {"a.tiff", "a.tif", "a.pfm"}) {
       write_map(folder / name, map);
       const cv::Mat again = read_map(folder / name);
-      ASSERT_EQ(again.type(), type) << name;
-      ASSERT_EQ(again.size(), map.size());
-      for (int y = 0; y < map.rows; ++y) {
-        EXPECT_EQ(std::memcmp(map.ptr(y), again.ptr(y), map.cols * map.elemSize()), 0) << name;
-      }
+      EXPECT_TRUE(same_bits(map, again)) << name;
     }
   }
 }
@@ -130,7 +125,7 @@ TEST(Images, KeepTheirDepthAndChannels) {
     write_image(folder / "i.png", image);
     const cv::Mat again = read_image(folder / "i.png");
     ASSERT_EQ(again.type(), type);
-    EXPECT_EQ(cv::norm(image, again, cv::NORM_INF), 0);
+    EXPECT_TRUE(same_bits(image, again));
   }
 }
 
@@ -147,7 +142,7 @@ TEST(Images, Of16BitsGoToFormatsThatHoldThem) {
     }
     for (const char* name : {"a.png", "a.tiff", type == CV_16UC1 ? "a.pgm" : "a.ppm"}) {
       write_image(folder / name, image);
-      EXPECT_EQ(cv::norm(image, read_image(folder / name), cv::NORM_INF), 0) << name;
+      EXPECT_TRUE(same_bits(image, read_image(folder / name))) << name;
     }
   }
 }
@@ -167,11 +162,22 @@ TEST(Images, BecomeIntensities) {
   EXPECT_THROW(to_intensity(cv::Mat(1, 1, CV_32FC1, cv::Scalar(3)), "x"), Error);
 }
 
+TEST(Images, BecomeGreyLevels) {
+  const cv::Mat deep = cv::Mat_<std::uint16_t>({1, 3}, {0, 13107, 65535});
+  const cv::Mat expected = cv::Mat_<std::uint8_t>({1, 3}, {0, 51, 255});
+  EXPECT_TRUE(same_bits(to_grey_levels(deep, "x"), expected));
+  EXPECT_EQ(to_grey_levels(cv::Mat(1, 1, CV_8UC3, cv::Scalar(0, 255, 0)), "x").at<uchar>(0), 150);
+  const TemporaryFolder folder;
+  write_image(folder / "deep.png", deep);
+  EXPECT_TRUE(same_bits(read_grey_levels(folder / "deep.png"), expected));
+  EXPECT_NE(error_of([] { to_grey_levels({}, "none.png"); }).find("none.png"), std::string::npos);
+}
+
 TEST(Images, OfFewerBitsAreStretched) {
   const cv::Mat of_12_bits = cv::Mat_<std::uint16_t>({1, 3}, {0, 819, 4095});
   const cv::Mat result = stretched(of_12_bits, 4095, "x");
   const cv::Mat expected = cv::Mat_<std::uint16_t>({1, 3}, {0, 13107, 65535});
-  EXPECT_EQ(cv::norm(result, expected, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(result, expected));
   EXPECT_EQ(stretched(cv::Mat(2, 2, CV_16UC3, cv::Scalar::all(255)), 255, "x").at<ushort>(1, 5),
             65535);
   EXPECT_NE(error_of([&] {
@@ -188,7 +194,7 @@ TEST(Images, MasksAreAllThatIsAboveZero) {
   const cv::Mat mask = read_mask(folder / "mask.png");
   const cv::Mat expected = cv::Mat_<std::uint8_t>({1, 3}, {0, 255, 255});
   ASSERT_EQ(mask.type(), expected.type());
-  EXPECT_EQ(cv::norm(mask, expected, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(mask, expected));
   // Labels: as grey, the darkest colours are 0.
   const cv::Mat labels = (cv::Mat_<cv::Vec3b>(1, 4) << cv::Vec3b(0, 0, 0), cv::Vec3b(1, 0, 0),
                           cv::Vec3b(0, 1, 0), cv::Vec3b(0, 0, 1));

@@ -6,17 +6,23 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 
+#include "bytes_of.h"
 #include "comma_locale.h"
 #include "error_of.h"
+#include "same_bits.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
+#include "widestereo/image_io.h"
 #include "widestereo/matcher.h"
 #include "widestereo/point_cloud.h"
 
 namespace widestereo {
 namespace {
+
+using test::same_bits;
 
 TEST(Pictures, NearIsRedFarIsBlueNothingIsGrey) {
   const cv::Mat distance = (cv::Mat_<float>(1, 3) << 1, 10, 0);
@@ -97,7 +103,7 @@ TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
                               with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
     EXPECT_EQ(with.cols, 200);
     EXPECT_GT(with.rows, 110);
-    EXPECT_EQ(cv::norm(with.rowRange(0, 100), picture, cv::NORM_INF), 0);
+    EXPECT_TRUE(same_bits(with.rowRange(0, 100), picture));
     cv::Scalar mean;
     cv::Scalar spread;
     cv::meanStdDev(with.rowRange(100, with.rows), mean, spread);
@@ -108,17 +114,52 @@ TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
 TEST(Pictures, DistanceLegendNamesTheUnit) {
   const cv::Mat picture(100, 400, CV_8UC3, cv::Scalar(1, 2, 3));
   const cv::Mat metres = with_distance_legend(picture, {1, 5});
-  EXPECT_EQ(cv::norm(metres, with_distance_legend(picture, {1, 5}, " m"), cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(metres, with_distance_legend(picture, {1, 5}, " m")));
   EXPECT_GT(cv::norm(metres, with_distance_legend(picture, {1, 5}, ""), cv::NORM_INF), 100);
+}
+
+TEST(Pictures, ScalarsGoFromDarkToBright) {
+  constexpr int steps = 32;
+  cv::Mat map(1, steps, CV_32FC1);
+  for (int i = 0; i < steps; ++i) map.at<float>(i) = -2 + 5 * static_cast<float>(i) / (steps - 1);
+  const cv::Mat picture = scalar_picture(map, -2, 3);
+  const cv::Mat grey = to_grey_levels(picture, "picture");
+  EXPECT_LT(grey.at<uchar>(0), 50);
+  EXPECT_GT(grey.at<uchar>(steps - 1), 200);
+  for (int i = 1; i < steps; ++i) EXPECT_GT(grey.at<uchar>(i), grey.at<uchar>(i - 1)) << i;
+  const cv::Mat ends = scalar_picture((cv::Mat_<float>(1, 2) << -9, 9), -2, 3);
+  EXPECT_EQ(ends.at<cv::Vec3b>(0), picture.at<cv::Vec3b>(0));
+  EXPECT_EQ(ends.at<cv::Vec3b>(1), picture.at<cv::Vec3b>(steps - 1));
 }
 
 TEST(Pictures, SheetHoldsAllPanels) {
   const cv::Mat grey(50, 80, CV_8UC1, cv::Scalar(9));
-  const cv::Mat deep(100, 160, CV_16UC3, cv::Scalar(1000, 2000, 3000));
-  const cv::Mat sheet = panel_sheet({{"a", grey}, {"b", deep}, {"c", grey}}, 2);
-  EXPECT_GT(sheet.cols, 160);
-  EXPECT_GT(sheet.rows, 100);
-  EXPECT_EQ(sheet.type(), CV_8UC3);
+  const cv::Mat deep(100, 160, CV_16UC3, cv::Scalar(257 * 10, 257 * 20, 257 * 30));
+  const cv::Mat red(40, 80, CV_8UC4, cv::Scalar(0, 0, 200, 7));
+  const cv::Mat sheet = panel_sheet({{"a", grey}, {"b", deep}, {"c", red}}, 2);
+  ASSERT_EQ(sheet.type(), CV_8UC3);
+  // Where a colour is in the sheet, of which it must fill a rectangle.
+  const auto place_of = [&sheet](const cv::Scalar& colour) {
+    cv::Mat is_there;
+    cv::inRange(sheet, colour, colour, is_there);
+    const cv::Rect place = cv::boundingRect(is_there);
+    EXPECT_EQ(cv::countNonZero(is_there), place.area()) << colour;
+    return place;
+  };
+  const cv::Rect a = place_of({9, 9, 9}), b = place_of({10, 20, 30}), c = place_of({0, 0, 200});
+  EXPECT_EQ(a.size(), grey.size());
+  EXPECT_EQ(b.size(), grey.size()) << "as wide as the first";
+  EXPECT_EQ(c.size(), red.size());
+  EXPECT_GT(b.x, a.br().x);
+  EXPECT_EQ(b.y, a.y);
+  EXPECT_EQ(c.x, a.x);
+  EXPECT_GT(c.y, a.br().y);
+  for (const cv::Rect& panel : {a, b, c}) {
+    cv::Mat ink;
+    const cv::Mat above = sheet(cv::Rect(panel.x, panel.y - a.y, panel.width, a.y));
+    cv::inRange(above, cv::Scalar::all(0), cv::Scalar::all(128), ink);
+    EXPECT_GT(cv::countNonZero(ink), 5) << "a title";
+  }
   EXPECT_THROW(panel_sheet({}, 2), Error);
   EXPECT_THROW(panel_sheet({{"a", grey}}, 0), Error);
 }
@@ -130,7 +171,7 @@ TEST(Pictures, TakeImagesOfAnySize) {
       for (const cv::Mat& with : {with_distance_legend(picture, {1, 5}),
                                   with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
         EXPECT_EQ(with.cols, std::max(cols, 64));
-        EXPECT_EQ(cv::norm(with(cv::Rect({}, picture.size())), picture, cv::NORM_INF), 0);
+        EXPECT_TRUE(same_bits(with(cv::Rect({}, picture.size())), picture));
         const cv::Mat sheet = panel_sheet({{"image", picture}, {"legend", with}}, 4);
         EXPECT_GT(sheet.rows, with.rows) << cols << "x" << rows;
       }
@@ -249,8 +290,7 @@ TEST(PointCloud, FilesDoNotDependOnTheLocale) {
   const test::TemporaryFolder folder;
   const test::CommaStreams streams;
   write_ply(folder / "c.ply", PointCloud(1234));
-  std::ifstream file(folder / "c.ply", std::ios::binary);
-  const std::string header{std::istreambuf_iterator<char>(file), {}};
+  const std::string header = test::bytes_of(folder / "c.ply");
   EXPECT_NE(header.find("element vertex 1234\n"), std::string::npos);
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "cpu/kernels.h"
 #include "schedule/schedule.h"
@@ -81,6 +82,12 @@ inline cv::Mat gradient(cv::Size size, double along_x, double along_y, double no
     }
   }
   return image;
+}
+
+inline std::vector<cv::Size> sizes_of(const std::vector<View>& views) {
+  std::vector<cv::Size> sizes;
+  for (const View& view : views) sizes.emplace_back(view.camera.width, view.camera.height);
+  return sizes;
 }
 
 /// Leaves of a schedule what comes up to its first dispatch of a kernel.

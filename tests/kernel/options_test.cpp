@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
 
 #include "error_of.h"
 
@@ -12,6 +14,11 @@ namespace widestereo::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string error_of_options(const Options& options) {
+  return error_of([&] { validate(options); });
+}
 
 /// JSON, in which numbers are printed, has a null for them.
 TEST(Options, NumbersThatAreNotFiniteAreNamed) {
@@ -19,7 +26,7 @@ TEST(Options, NumbersThatAreNotFiniteAreNamed) {
   const auto error = [](double Options::*option, double value) {
     Options options;
     options.*option = value;
-    return error_of([&] { validate(options); });
+    return error_of_options(options);
   };
   EXPECT_THAT(error(&Options::max_cost, std::numeric_limits<double>::quiet_NaN()),
               HasSubstr("The option max cost is NaN (not a number); it must lie between 0.0"));
@@ -31,9 +38,116 @@ TEST(Options, NumbersThatAreNotFiniteAreNamed) {
 TEST(Options, RasterOrderBelongsToTheRandomSearch) {
   Options options = Options::preset_named("fast");
   options.propagation = Propagation::raster;
-  EXPECT_THAT(error_of([&] { validate(options); }), HasSubstr("checkerboard propagation"));
+  EXPECT_THAT(error_of_options(options), HasSubstr("checkerboard propagation"));
   options.search = SearchMethod::random;
-  EXPECT_EQ(error_of([&] { validate(options); }), "");
+  EXPECT_EQ(error_of_options(options), "");
+}
+
+template <class T>
+struct Range {
+  const char* name;
+  T Options::*option;
+  T least, most;
+};
+
+const std::vector<Range<int>> whole_numbers = {
+    {"window radius", &Options::window_radius, 1, 15},
+    {"first iterations", &Options::first_iterations, 1, 100000},
+    {"second iterations", &Options::second_iterations, 0, 100000},
+    {"refinements", &Options::refinements, 0, 16},
+    {"best sources", &Options::best_sources, 1, 8},
+    {"sweep steps", &Options::sweep_steps, 1, 10000},
+    {"coarse planes", &Options::coarse_planes, 1, 4},
+    {"regression radius", &Options::regression_radius, 2, 64},
+    {"regression steps", &Options::regression_steps, 1, 16},
+    {"warm iterations", &Options::warm_iterations, 0, 100000},
+    {"warm regressions", &Options::warm_regressions, 0, 1000},
+    {"vote radius", &Options::vote_radius, 0, 64},
+    {"repair radius", &Options::repair_radius, 0, 10000},
+    {"fill radius", &Options::fill_radius, 0, 10000}};
+
+const std::vector<Range<double>> numbers = {
+    {"weight scale", &Options::weight_scale, 0, 10000},
+    {"regression scale", &Options::regression_scale, 0.1, 10000},
+    {"regression precision", &Options::regression_precision, 1e-6, 1000},
+    {"step pixels", &Options::step_pixels, 0, 1000},
+    {"step normal", &Options::step_normal, 0, 2},
+    {"min texture", &Options::min_texture, 0, 255},
+    {"min visible", &Options::min_visible, 0, 1},
+    {"consistency (relative)", &Options::consistency_relative, 0, 1000},
+    {"consistency (pixels)", &Options::consistency_pixels, 0, 1000},
+    {"max cost", &Options::max_cost, 0, 2},
+    {"min parallax", &Options::min_parallax, 0, 10000},
+    {"max tilt", &Options::max_tilt, 0, 90},
+    {"min support", &Options::min_support, 0, 1},
+    {"ambiguity margin", &Options::ambiguity_margin, 0, 2},
+    {"far preference", &Options::far_preference, 0, 1}};
+
+TEST(Options, ReachToTheirLimitsAndNoFarther) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const auto expect = [](const auto& range, auto below, auto above) {
+    const auto error = [&range](auto value) {
+      Options options;
+      options.*range.option = value;
+      return error_of_options(options);
+    };
+    EXPECT_EQ(error(range.least), "");
+    EXPECT_EQ(error(range.most), "");
+    const std::string begin = "The option " + std::string(range.name) + " is ";
+    EXPECT_THAT(error(below), StartsWith(begin));
+    EXPECT_THAT(error(above), StartsWith(begin));
+  };
+  for (const Range<int>& range : whole_numbers) {
+    expect(range, range.least - 1, range.most + 1);
+  }
+  for (const Range<double>& range : numbers) {
+    expect(range, std::nextafter(range.least, -infinity), std::nextafter(range.most, infinity));
+  }
+}
+
+TEST(Options, DistancesAreARange) {
+  const auto error = [](double nearest, double farthest) {
+    Options options;
+    options.min_distance = nearest;
+    options.max_distance = farthest;
+    return error_of_options(options);
+  };
+  EXPECT_EQ(error(Options::least_distance, Options::most_distance), "");
+  for (const auto& [nearest, farthest] : {std::pair(0.9 * Options::least_distance, 1.0),
+                                          {1.0, 1.1 * Options::most_distance},
+                                          {2.0, 2.0},
+                                          {2.0, 1.0},
+                                          {-1.0, 1.0}}) {
+    EXPECT_THAT(error(nearest, farthest), HasSubstr("m is not usable")) << nearest << farthest;
+  }
+}
+
+TEST(Options, HaveANumberForEachLevel) {
+  for (const auto& [list, name] : {std::pair(&Options::level_iterations, "level iterations"),
+                                   {&Options::level_regressions, "level regressions"}}) {
+    const auto error = [list = list](std::vector<int> of_levels) {
+      Options options;
+      options.*list = std::move(of_levels);
+      return error_of_options(options);
+    };
+    EXPECT_EQ(error({0, 1000, 1}), "");
+    const std::string option = "The option " + std::string(name);
+    EXPECT_THAT(error({1, -1, 1}), StartsWith(option + " is -1"));
+    EXPECT_THAT(error({1, 1, 1001}), StartsWith(option + " is 1001"));
+    EXPECT_THAT(error({1, 1}), StartsWith(option + " has 2 numbers; give one for each of the 3"));
+  }
+  for (int levels = 0; levels <= 5; ++levels) {
+    Options options;
+    options.levels = levels;
+    options.level_iterations.assign(static_cast<std::size_t>(levels), 1);
+    options.level_regressions = options.level_iterations;
+    const std::string error = error_of_options(options);
+    if (levels >= 1 && levels <= 4) {
+      EXPECT_EQ(error, "");
+    } else {
+      EXPECT_THAT(error, StartsWith("The option levels is "));
+    }
+  }
 }
 
 }  // namespace

@@ -251,6 +251,51 @@ TEST_F(Fusion, SurfacesSeenFromTheirTwoSidesStayApart) {
   EXPECT_FALSE(fuse_all(options).empty());
 }
 
+/// A pixel and the one that it falls on in a view from the same place with pixels six times as
+/// large, whose centre is 1.5 or 2.5 pixels away.
+TEST_F(Fusion, PixelsFartherThanTheLargestDisplacementAreNotJoined) {
+  View fine;
+  fine.name = "fine";
+  fine.camera.width = fine.camera.height = side;
+  fine.camera.fx = fine.camera.fy = 120;
+  fine.camera.cx = 31.5;
+  fine.camera.cy = 32;
+  View coarse = fine;
+  coarse.name = "coarse";
+  coarse.camera.width = coarse.camera.height = 11;
+  coarse.camera.fx = coarse.camera.fy = 20;
+  coarse.camera.cx = coarse.camera.cy = 5;
+  const auto are_joined = [&](int column, double max_pixels) {
+    cv::Mat distance = cv::Mat::zeros(side, side, CV_32FC1);
+    distance.at<float>(32, column) = 2;
+    const cv::Mat of_coarse(11, 11, CV_32FC1, cv::Scalar(2));
+    FusionOptions options;
+    options.max_pixels = max_pixels;
+    const PointCloud cloud = fuse(
+        {fine, coarse}, {{1}, {}},
+        [&](std::size_t i) {
+          return ViewMaps{.distance = i == 0 ? distance : of_coarse,
+                          .normals = {},
+                          .image = {},
+                          .confidence = {}};
+        },
+        options);
+    return cloud.size() == 1;
+  };
+  const double by_default = FusionOptions().max_pixels;
+  for (const int side_of_centre : {-1, 1}) {
+    const auto column = [&](double pixels) {
+      return static_cast<int>(31.5 + side_of_centre * pixels);
+    };
+    EXPECT_TRUE(are_joined(column(1.5), by_default));
+    EXPECT_FALSE(are_joined(column(2.5), by_default));
+    EXPECT_FALSE(are_joined(column(1.5), 1.4));
+    EXPECT_TRUE(are_joined(column(1.5), 1.6));
+    EXPECT_FALSE(are_joined(column(2.5), 2.4));
+    EXPECT_TRUE(are_joined(column(2.5), 2.6));
+  }
+}
+
 /// Of a wall 2 m ahead of one view and 1 m ahead of the other, the nearer one knows four times as
 /// much.
 TEST_F(Fusion, NearViewsCountMore) {
