@@ -26,5 +26,6 @@ KERNEL(interpolate, REFERENCE)      // texels that samples of a view are filtere
 KERNEL(subpixel, REFERENCE)         // moves what was measured to where each patch matches best
 KERNEL(ambiguity, REFERENCE)        // adds to the checks where another place matches better
 KERNEL(adopt_point, REFERENCE)      // takes regressed planes over whose costs follow later
+KERNEL(renew_point, REFERENCE)      // starts a view from moved planes whose costs follow later
 KERNEL(check_for_vote, REFERENCE)   // consistency and reasons, and what the other view shows
 #undef KERNEL

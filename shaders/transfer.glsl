@@ -2,6 +2,11 @@
 // Starts a view from another view's planes: every plane is warped forward, the nearest one wins its pixel.
 // Integer atomics on inverse distances and pixel indices keep the outcome independent of the order.
 
+// By how much more than in the frame before, and up to what, a plane may cost before another one takes its place: what has
+// moved in front of it may match less well at first than it did.
+#define GROWTH_OF_COST 1.5f
+#define LEAST_COST_OF_MOVED 0.2f
+
 // Pixels along each side of what a plane is warped onto: the four around it, so that the planes of another view,
 // which sees everything at another size, leave no holes. Between two frames of one view the nearest one is enough
 // and does not fatten what is near, frame after frame; renewing fills the holes.
@@ -66,9 +71,10 @@ FN void transfer_winner_pixel(CONTEXT_ARGUMENT ivec2 p) {
 
 FN bool is_plane(vec3 m) { return m.x != 0.0f || m.y != 0.0f || m.z != 0.0f; }
 
-// The plane that won the pixel, in the reference frame; zero where none did or the pixel may not hold it.
-FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
-  vec3 none = vec3(0.0f, 0.0f, 0.0f);
+// The plane that won the pixel, in the reference frame, and its cost where it comes from; zero where none did or the pixel
+// may not hold it.
+FN vec4 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  vec4 none = vec4(0.0f, 0.0f, 0.0f, 0.0f);
   uint index = transfer_winner_at(CONTEXT pixel);
   if (index == 0xffffffffu) return none;
   int width = PARAMETERS.cameras[OTHER].size.x;
@@ -76,7 +82,7 @@ FN vec3 transferred_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   vec4 plane = hypothesis_at(CONTEXT OTHER, p);
   ViewPair pair = pair_between(CONTEXT OTHER, REFERENCE);
   vec3 moved = plane_in_source(pair, vec3(plane.x, plane.y, plane.z));
-  if (admissible(CONTEXT ray, moved)) return moved;
+  if (admissible(CONTEXT ray, moved)) return vec4(moved, plane.w);
   return none;
 }
 
@@ -87,20 +93,23 @@ FN void transfer_gather_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     return;
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec3 m = transferred_plane(CONTEXT pixel, ray);
+  vec4 transferred = transferred_plane(CONTEXT pixel, ray);
+  vec3 m = vec3(transferred.x, transferred.y, transferred.z);
   if (!is_plane(m)) m = random_plane(CONTEXT pixel, ray, 0);
   store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, patch_cost(CONTEXT pixel, m)));
 }
 
 // The same between two frames of one view, OTHER being the reference: the moved planes go where the priors
-// are, since other pixels still read the planes that they come from. (m, 1), zero where there is none.
+// are, since other pixels still read the planes that they come from. (m, what it may cost now), zero where there is none.
 FN void transfer_keep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
-  vec3 m = vec3(0.0f, 0.0f, 0.0f);
+  vec4 moved = vec4(0.0f, 0.0f, 0.0f, 0.0f);
   if (usable_ray.w != 0.0f) {
-    m = transferred_plane(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z));
+    moved = transferred_plane(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z));
   }
-  store_prior(CONTEXT REFERENCE, pixel, vec4(m, is_plane(m) ? 1.0f : 0.0f));
+  vec3 m = vec3(moved.x, moved.y, moved.z);
+  float cost = clamp(GROWTH_OF_COST * moved.w, LEAST_COST_OF_MOVED, NO_INFORMATION_COST);
+  store_prior(CONTEXT REFERENCE, pixel, vec4(m, is_plane(m) ? cost : 0.0f));
 }
 
 // The moved plane of the nearest pixel, about, that has one which this pixel may hold: surfaces continue into what
@@ -119,6 +128,13 @@ FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   return random_plane(CONTEXT pixel, ray, 0);
 }
 
+// The plane that a pixel starts from: the one that has moved there, or one nearby, and what it may cost.
+FN vec4 moved_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
+  if (prior.w != 0.0f) return prior;
+  return vec4(moved_plane_nearby(CONTEXT pixel, ray), NO_INFORMATION_COST);
+}
+
 // Starts a pixel from the plane that has moved there, which was seen before where its patch now is not.
 FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
@@ -127,10 +143,22 @@ FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     return;
   }
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
-  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
-  vec3 m = vec3(prior.x, prior.y, prior.z);
-  if (prior.w == 0.0f) m = moved_plane_nearby(CONTEXT pixel, ray);
+  vec4 moved = moved_plane(CONTEXT pixel, ray);
+  vec3 m = vec3(moved.x, moved.y, moved.z);
   float cost = patch_cost(CONTEXT pixel, m);
   if (cost >= INVALID_COST && in_some_source(CONTEXT ray, m)) cost = NO_INFORMATION_COST;
   store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, cost));
+}
+
+// Likewise, for a search whose planes all get costs of their own at the end.
+FN void renew_point_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  if (!is_usable(CONTEXT pixel, usable_ray)) {
+    store_no_plane(CONTEXT pixel);
+    return;
+  }
+  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec4 moved = moved_plane(CONTEXT pixel, ray);
+  vec3 m = vec3(moved.x, moved.y, moved.z);
+  store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, in_some_source(CONTEXT ray, m) ? moved.w : INVALID_COST));
 }

@@ -158,7 +158,11 @@ class Builder {
     interpolate(0);
     // One by one: they share the transfer buffers.
     for (const Views view : launches(0, one_by_one)) move_on(view);
-    add(Kernel::renew, pass_of(views_of(0)), views_of(0), 1);
+    if (costs_follow_in_warm_frames()) {
+      add(Kernel::renew_point, pass_of(views_of(0)), views_of(0), 0);
+    } else {
+      add(Kernel::renew, pass_of(views_of(0)), views_of(0), 1);
+    }
     if (options_.search == SearchMethod::pyramid) {
       search_warm();
     } else {
@@ -473,6 +477,12 @@ class Builder {
   /// of the planes before, which lie near enough to be checked.
   Kernel until_vote() const {
     return options_.vote_radius > 0 ? Kernel::adopt_point : Kernel::adopt;
+  }
+
+  /// A vote ends with costs for all planes.
+  bool costs_follow_in_warm_frames() const {
+    return options_.search == SearchMethod::pyramid && options_.warm_regressions > 0 &&
+           options_.vote_radius > 0;
   }
 
   void vote() {

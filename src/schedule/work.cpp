@@ -172,6 +172,8 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
       return {seen | plane | checks, texels, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
+    case Kernel::renew_point:
+      return {seen | prior, 0, plane};
     case Kernel::renew:
       return {seen | prior, texels, plane};
   }

@@ -100,9 +100,37 @@ TEST(Transfer, MovesAViewsOwnPlanesWithTheRig) {
   EXPECT_GT(share_that_holds(fixture.view(1).priors, expected), 0.97 - hole);
   EXPECT_LT(share_that_holds(fixture.view(1).priors, expected), 1 - 0.5 * hole)
       << "what had no plane has none now";
-  run_over(fixture, 1, kernel::cpu::renew_pixel);
-  EXPECT_GT(share_that_holds(fixture.view(1).hypotheses, expected), 0.99)
-      << "surfaces continue into holes";
+  for (const auto renew : {kernel::cpu::renew_pixel, kernel::cpu::renew_point_pixel}) {
+    fixture.view(1).hypotheses.setTo(cv::Scalar::all(0));
+    run_over(fixture, 1, renew);
+    EXPECT_GT(share_that_holds(fixture.view(1).hypotheses, expected), 0.99)
+        << "surfaces continue into holes";
+  }
+}
+
+/// Until a plane has a cost of its own, others must cost less than one and a half times as much as
+/// it did, or less than 0.2.
+TEST(Transfer, CostsThatFollowLaterComeFromTheFrameBefore) {
+  const Rig rig = fisheye_rig(96);
+  for (const auto& [before, expected] :
+       {std::pair(0.01f, 0.2f), {0.4f, 0.6f}, {0.9f, 1.0f}, {1.9f, 1.0f}}) {
+    KernelFixture fixture(rig, wide_range("fast"));
+    set_motion(fixture.schedule(), rig, Eigen::Isometry3d::Identity(), 1);
+    const vec3 m(0.05f, 0.1f, 0.5f);
+    fixture.view(0).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, before));
+    transfer(fixture, 0, 0, kernel::cpu::transfer_keep_pixel);
+    run_over(fixture, 0, kernel::cpu::renew_point_pixel);
+    EXPECT_FLOAT_EQ(fixture.view(0).hypotheses(48, 48)[3], expected);
+    // At the left border the other view, which is on the right, does not see what is near.
+    int unseen = 0;
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) unseen += fixture.view(0).hypotheses(y, x)[3] == INVALID_COST;
+    }
+    EXPECT_GT(unseen, 0);
+    fixture.view(0).priors.setTo(cv::Scalar::all(0));
+    run_over(fixture, 0, kernel::cpu::renew_point_pixel);
+    EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[3], 1) << "nothing moved there";
+  }
 }
 
 TEST(Transfer, LeavesNoHolesInAViewThatSeesEverythingLarger) {
@@ -181,8 +209,11 @@ TEST(Transfer, SurfacesContinueIntoHolesFromEveryDirection) {
     const int x = 48 + 8 * (i % 3 - 1);
     const int y = 48 + 8 * (i / 3 - 1);
     fixture.view(0).priors(y, x) = cv::Vec4f(m.x, m.y, m.z, 1);
-    kernel::cpu::renew_pixel(fixture.context(), {48, 48});
-    EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[2], m.z) << "from " << x << ", " << y;
+    for (const auto renew : {kernel::cpu::renew_pixel, kernel::cpu::renew_point_pixel}) {
+      fixture.view(0).hypotheses(48, 48) = {};
+      renew(fixture.context(), {48, 48});
+      EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[2], m.z) << "from " << x << ", " << y;
+    }
   }
 }
 

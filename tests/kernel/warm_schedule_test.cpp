@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "kernel_fixture.h"
@@ -39,6 +40,28 @@ TEST(WarmSchedule, RunsOnWhatAColdOneNeeds) {
       EXPECT_EQ(dispatch.pass.other, dispatch.pass.reference);
     }
   }
+}
+
+/// A search that does not vote leaves planes with the costs that they started with.
+TEST(WarmSchedule, PlanesStartWithoutCostsWhereVotesGiveThem) {
+  const auto starts_with_costs = [](const Options& options) {
+    const Schedule warm = make_warm_schedule(fisheye_rig(64), options);
+    const auto runs = [&warm](Kernel kernel) {
+      return std::any_of(warm.dispatches.begin(), warm.dispatches.end(),
+                         [kernel](const Dispatch& dispatch) { return dispatch.kernel == kernel; });
+    };
+    EXPECT_NE(runs(Kernel::renew), runs(Kernel::renew_point));
+    return runs(Kernel::renew);
+  };
+  EXPECT_FALSE(starts_with_costs(Options::preset_named("fast")));
+  EXPECT_FALSE(starts_with_costs(Options::preset_named("quality")));
+  EXPECT_TRUE(starts_with_costs(Options::preset_named("paper")));
+  Options options = Options::preset_named("fast");
+  options.vote_radius = 0;
+  EXPECT_TRUE(starts_with_costs(options));
+  options = Options::preset_named("fast");
+  options.warm_regressions = 0;
+  EXPECT_TRUE(starts_with_costs(options));
 }
 
 TEST(WarmSchedule, MotionChangesParametersOnly) {
