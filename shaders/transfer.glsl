@@ -2,8 +2,8 @@
 // Starts a view from another view's planes: every plane is warped forward, the nearest one wins its pixel.
 // Integer atomics on inverse distances and pixel indices keep the outcome independent of the order.
 
-// By how much more than in the frame before, and up to what, a plane may cost before another one takes its place: what has
-// moved in front of it may match less well at first than it did.
+// A plane that moved gives way to one that costs less than so many times what it did in the frame before, and to any that
+// costs less than this: what has come in front of it may match less well at first than it did.
 #define GROWTH_OF_COST 1.5f
 #define LEAST_COST_OF_MOVED 0.2f
 
@@ -128,7 +128,7 @@ FN vec3 moved_plane_nearby(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   return random_plane(CONTEXT pixel, ray, 0);
 }
 
-// The plane that a pixel starts from: the one that has moved there, or one nearby, and what it may cost.
+// The plane that a usable pixel starts from: the one that has moved there, or one nearby, and what it may cost.
 FN vec4 moved_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
   vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   if (prior.w != 0.0f) return prior;

@@ -20,7 +20,7 @@ namespace {
 
 /// Keeps the numbers of the finest levels; levels more are like the coarsest.
 void fit_to_levels(std::vector<int>& of_levels, int levels) {
-  const auto wanted = static_cast<std::size_t>(std::max(levels, 1));
+  const auto wanted = static_cast<std::size_t>(std::clamp(levels, 1, Options::most_levels));
   while (of_levels.size() > wanted) of_levels.erase(of_levels.begin());
   while (of_levels.size() < wanted) of_levels.insert(of_levels.begin(), of_levels.front());
 }

@@ -62,6 +62,7 @@ std::string to_string(Filter filter);
 struct Options {
   /// What distances may be: the matcher squares them, and their inverses, in single precision.
   static constexpr double least_distance = 1e-6, most_distance = 1e9;
+  static constexpr int most_levels = 4;
 
   std::string preset = "paper";
   double min_distance = 0.3;  ///< metres along the ray, at least least_distance
@@ -89,7 +90,7 @@ struct Options {
   Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid.
-  int levels = 3;        ///< each half the size of the finer one, 1..4
+  int levels = 3;        ///< each half the size of the finer one, 1..most_levels
   int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
   /// Coarsest level first, one for each level, 0..1000.
   std::vector<int> level_iterations = {2, 2, 2};

@@ -91,12 +91,11 @@ void validate(const Options& o) {
   if (o.propagation == Propagation::raster && o.search == SearchMethod::pyramid) {
     throw Error(
         "Raster-order propagation belongs to the random search; choose checkerboard propagation, "
-        "or "
-        "the preset \"paper\".");
+        "or the preset \"paper\".");
   }
   require_between(o.best_sources, 1, 8, "best sources");
   require_between(o.weight_scale, 0, 10000, "weight scale");
-  require_between(o.levels, 1, 4, "levels");
+  require_between(o.levels, 1, Options::most_levels, "levels");
   require_between(o.sweep_steps, 1, 10000, "sweep steps");
   require_between(o.coarse_planes, 1, 4, "coarse planes");
   for (const auto& [values, name] : {std::pair(&o.level_iterations, "level iterations"),

@@ -237,7 +237,8 @@ TEST_F(EvaluateSets, AreFoundByTheirNames) {
   expect_error("evaluate " + file("prediction.tiff") + " --set " + file("none"),
                "There is no folder " + file("none"));
   fs::remove(folder_ / "set/depth0.tiff");
-  expect_error("evaluate " + file("prediction.tiff") + " " + set, "--truth and --calibration");
+  expect_error("evaluate " + file("prediction.tiff") + " " + set,
+               "has no depth0.tiff; give --truth");
 }
 
 }  // namespace
