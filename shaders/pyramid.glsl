@@ -18,12 +18,8 @@ FN void downsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 
 // Starts a pixel from fronto-spherical planes at PASS.steps inverse distances over the whole range.
 FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
-  if (!is_usable(CONTEXT pixel, usable_ray)) {
-    store_no_plane(CONTEXT pixel);
-    return;
-  }
-  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 ray;
+  if (!starts_with_plane(CONTEXT pixel, ray)) return;
   vec4 best = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
   vec4 range = PARAMETERS.range;
   for (int i = 0; i < PASS.steps; ++i) {
@@ -36,12 +32,8 @@ FN void sweep_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 // Starts a pixel from the best of the PASS.places nearest coarser pixels' planes, of four: evaluated at the finer ray
 // they are exact, so slanted surfaces need no interpolation. A random plane where there is none.
 FN void upsample_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
-  if (!is_usable(CONTEXT pixel, usable_ray)) {
-    store_no_plane(CONTEXT pixel);
-    return;
-  }
-  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 ray;
+  if (!starts_with_plane(CONTEXT pixel, ray)) return;
   vec4 best = vec4(0.0f, 0.0f, 0.0f, INVALID_COST);
   for (int i = 0; i <= PASS.places; ++i) {
     vec3 m = vec3(0.0f, 0.0f, 0.0f);

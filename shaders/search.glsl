@@ -140,6 +140,15 @@ FN void store_no_plane(CONTEXT_ARGUMENT ivec2 pixel) {
   store_hypothesis(CONTEXT REFERENCE, pixel, vec4(0.0f, 0.0f, 0.0f, INVALID_COST));
 }
 
+// False where the reference has no ray or no intensity, and no plane is stored.
+FN bool starts_with_plane(CONTEXT_ARGUMENT ivec2 pixel, OUT(vec3) ray) {
+  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
+  ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  if (is_usable(CONTEXT pixel, usable_ray)) return true;
+  store_no_plane(CONTEXT pixel);
+  return false;
+}
+
 FN void initialise_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
   if (ray.w == 0.0f) {

@@ -137,12 +137,8 @@ FN vec4 moved_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
 
 // Starts a pixel from the plane that has moved there, which was seen before where its patch now is not.
 FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
-  if (!is_usable(CONTEXT pixel, usable_ray)) {
-    store_no_plane(CONTEXT pixel);
-    return;
-  }
-  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 ray;
+  if (!starts_with_plane(CONTEXT pixel, ray)) return;
   vec4 moved = moved_plane(CONTEXT pixel, ray);
   vec3 m = vec3(moved.x, moved.y, moved.z);
   float cost = patch_cost(CONTEXT pixel, m);
@@ -152,12 +148,8 @@ FN void renew_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 
 // Likewise, for a search whose planes all get costs of their own at the end.
 FN void renew_point_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
-  vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
-  if (!is_usable(CONTEXT pixel, usable_ray)) {
-    store_no_plane(CONTEXT pixel);
-    return;
-  }
-  vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
+  vec3 ray;
+  if (!starts_with_plane(CONTEXT pixel, ray)) return;
   vec4 moved = moved_plane(CONTEXT pixel, ray);
   vec3 m = vec3(moved.x, moved.y, moved.z);
   store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, in_some_source(CONTEXT ray, m) ? moved.w : INVALID_COST));
