@@ -95,8 +95,11 @@ class ViewWriter {
       if (!format_.no_cloud) ws::write_ply(named("cloud", ".ply"), cloud);
       if (!format_.no_pictures) write_pictures(cloud);
     }
+    const cv::Mat textured = textured_pixels();
     const ws::ConsistencyScores scores =
-        ws::consistency_scores(result_.differences, result_.cost, textured_pixels());
+        ws::consistency_scores(result_.differences, result_.cost, textured);
+    const ws::ConsistencyScores of_accepted = ws::consistency_scores(
+        result_.differences, result_.cost, textured & (result_.reasons == 0));
     return {{"name", view_.name},
             {"model", to_string(view_.camera.model)},
             {"width", view_.camera.width},
@@ -110,6 +113,7 @@ class ViewWriter {
             {"mean_cost", scores.mean_cost},
             {"cost_below_0.2", scores.low_cost},
             {"cost_below_0.2_textured", scores.low_cost_textured},
+            {"cost_below_0.2_textured_accepted", of_accepted.low_cost_textured},
             {"textured_pixels", scores.textured},
             {"consistent_within_2_percent", scores.consistent_relative},
             {"consistent_within_2_pixels", scores.consistent_pixels},
@@ -372,11 +376,12 @@ void report(const Json& record, const fs::path& folder, bool as_json) {
               record["options"]["preset"].get<std::string>().c_str());
   for (const auto& view : record["views"]) {
     std::printf(
-        "%s: %.1f %% accepted, mean cost %.3f, cost < 0.2 %.1f %% (%.1f %% of textured pixels), "
-        "left-right within 2 %% %.1f %%, within 2 px %.1f %%\n",
+        "%s: %.1f %% accepted, mean cost %.3f, cost < 0.2 %.1f %% (%.1f %% of textured pixels, "
+        "%.1f %% of those accepted), left-right within 2 %% %.1f %%, within 2 px %.1f %%\n",
         view["name"].get<std::string>().c_str(), 100 * view["accepted"].get<double>(),
         view["mean_cost"].get<double>(), 100 * view["cost_below_0.2"].get<double>(),
         100 * view["cost_below_0.2_textured"].get<double>(),
+        100 * view["cost_below_0.2_textured_accepted"].get<double>(),
         100 * view["consistent_within_2_percent"].get<double>(),
         100 * view["consistent_within_2_pixels"].get<double>());
   }

@@ -97,8 +97,8 @@ TEST_F(Command, DepthScoresTexturedPixels) {
   }
   const Outcome outcome = run(depth_of("left.png", "right.png"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find(" % of textured pixels), left-right"), std::string::npos)
-      << outcome.output;
+  EXPECT_NE(outcome.output.find(" % of textured pixels, "), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find(" % of those accepted), left-right"), std::string::npos);
   std::ifstream stream(folder_ / "out/result.json");
   const nlohmann::json view = nlohmann::json::parse(stream)["views"][0];
   const cv::Mat cost = cv::imread(file("out/cost0.tiff"), cv::IMREAD_UNCHANGED);
@@ -110,6 +110,12 @@ TEST_F(Command, DepthScoresTexturedPixels) {
   EXPECT_NEAR(view["cost_below_0.2_textured"], cv::countNonZero(textured < 0.2f) / double(planes),
               1e-9);
   EXPECT_LT(view["cost_below_0.2"], view["cost_below_0.2_textured"]) << "the wall has no low cost";
+  const cv::Mat reasons = cv::imread(file("out/reasons0.png"), cv::IMREAD_UNCHANGED);
+  const cv::Mat accepted = reasons.rowRange(44, 96) == 0;
+  EXPECT_NEAR(view["cost_below_0.2_textured_accepted"],
+              cv::countNonZero((textured < 0.2f) & accepted) / double(cv::countNonZero(accepted)),
+              1e-9);
+  EXPECT_LT(cv::countNonZero(accepted), planes) << "else the two shares are the same";
 }
 
 /// The pair of calib.yaml, taken by its first camera alone in two places.
@@ -451,7 +457,8 @@ TEST_F(Command, RefusedRequestsLeaveNoFolder) {
                file("one.png") + " is 1x1 pixels");
   expect_error(depth + "--device cpu --mask " + file("none.png"),
                "The mask " + file("none.png") + " is 0 everywhere");
-  expect_error("demo --size 64 --device cpu --level-iterations 1 -o " + file("out"), "level iterations");
+  expect_error("demo --size 64 --device cpu --level-iterations 1 -o " + file("out"),
+               "level iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
