@@ -43,11 +43,11 @@ class CpuBackend final : public Backend {
   void set_intensity(int view, const cv::Mat& intensity) override {
     intensity.copyTo(views_[view].image());
   }
-  cv::Mat hypotheses(int view) override { return views_[view].hypotheses.clone(); }
+  cv::Mat hypotheses(int view) override { return views_[view].hypotheses; }
   void set_hypotheses(int view, const cv::Mat& hypotheses) override {
     hypotheses.copyTo(views_[view].hypotheses);
   }
-  cv::Mat checks(int view) override { return views_[view].checks.clone(); }
+  cv::Mat checks(int view) override { return views_[view].checks; }
   std::vector<KernelTime> times() const override { return times_.list(); }
   std::size_t device_bytes() const override { return bytes_; }
 

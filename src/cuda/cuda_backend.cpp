@@ -16,10 +16,6 @@ namespace {
 
 constexpr dim3 threads_of_block(kernel::cuda::block_width, kernel::cuda::block_height);
 
-std::size_t area(cv::Size size) {
-  return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
-}
-
 /// Parameters may differ: launches read them from device memory.
 bool same_launches(const Schedule& a, const Schedule& b) {
   return a.constants == b.constants &&
@@ -127,6 +123,7 @@ void CudaBackend::release() {
   maps_.clear();
   transfer_nearest_ = {};
   transfer_winner_ = {};
+  staging_ = {};
   stream_.reset();
 }
 
@@ -135,9 +132,8 @@ void CudaBackend::check(cudaError_t result, const char* action) const {
 }
 
 void CudaBackend::make_maps() {
-  std::size_t largest = 0;
   for (const cv::Size& size : sizes_) {
-    const std::size_t pixels = area(size);
+    const std::size_t pixels = largest_area({size});
     const std::string& name = target_.name;
     const cudaStream_t stream = stream_.get();
     ViewMaps& maps = maps_.emplace_back();
@@ -156,8 +152,8 @@ void CudaBackend::make_maps() {
         maps.hypotheses.get(),     maps.checks.get(),
         maps.priors.get(),         size.width,
         maps.intensities.stride(), maps.texels.stride()};
-    largest = std::max(largest, pixels);
   }
+  const std::size_t largest = largest_area(sizes_);
   transfer_nearest_ =
       DeviceArray<unsigned>(largest, stream_.get(), target_.name, "a transfer buffer");
   transfer_winner_ =
@@ -192,7 +188,11 @@ void CudaBackend::upload(void* memory, int stride, int view, const cv::Mat& map,
 
 cv::Mat CudaBackend::download(const void* memory, int view) {
   const CurrentDevice current = make_current();
-  cv::Mat map(size(view), CV_32FC4);
+  // Applications that have their maps on the device have no use for it.
+  if (staging_.get() == nullptr) {
+    staging_ = PinnedMemory(largest_area(sizes_) * sizeof(cv::Vec4f), target_.name);
+  }
+  const cv::Mat map(size(view), CV_32FC4, staging_.get());
   check(cudaMemcpyAsync(map.data, memory, map.total() * map.elemSize(), cudaMemcpyDeviceToHost,
                         stream_.get()),
         "send a map");

@@ -11,7 +11,7 @@ std::string explain(cudaError_t result) {
   const std::string name = std::string(" (") + cudaGetErrorName(result) + ")";
   switch (result) {
     case cudaErrorMemoryAllocation:
-      return "out of device memory; use smaller images, fewer levels or another device.";
+      return "out of memory; use smaller images, fewer levels or another device.";
     case cudaErrorNoKernelImageForDevice:
     case cudaErrorInvalidDeviceFunction:
     case cudaErrorUnsupportedPtxVersion:

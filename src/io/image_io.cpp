@@ -232,7 +232,8 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
   }
   cv::Mat intensity;
   grey.convertTo(intensity, CV_32F, scale);
-  if (!cv::checkRange(intensity, true, nullptr, 0, 1 + 1e-6)) {
+  // Integers are in range.
+  if (image.depth() == CV_32F && !cv::checkRange(intensity, true, nullptr, 0, 1 + 1e-6)) {
     throw Error(name + " has values outside [0, 1] or not finite; scale it first.");
   }
   return intensity;

@@ -36,6 +36,15 @@ void ScheduleProgress::advance(long long samples) {
   }
 }
 
+std::size_t largest_area(const std::vector<cv::Size>& sizes) {
+  std::size_t area = 0;
+  for (const cv::Size& size : sizes) {
+    area = std::max(area,
+                    static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height));
+  }
+  return area;
+}
+
 void require_map(const cv::Mat& map, int view, cv::Size size, int type) {
   require_map(map, size, type, "The map for view " + std::to_string(view));
 }

@@ -35,6 +35,9 @@ class ScheduleProgress {
   long long done_ = 0;
 };
 
+/// Pixels of the largest view.
+std::size_t largest_area(const std::vector<cv::Size>& sizes);
+
 /// Size of the memory of an image of intensities (shaders/parameters.glsl).
 inline cv::Size with_apron(cv::Size size) {
   return {size.width + 2 * APRON, size.height + 2 * APRON};
@@ -64,11 +67,11 @@ class Backend {
   virtual void set_intensity(int view, const cv::Mat& intensity) = 0;
   /// Runs the dispatches in order and waits for them. `progress` may be empty.
   virtual void run(const Schedule& schedule, const Matcher::Progress& progress) = 0;
-  /// Plane hypotheses (m, cost), CV_32FC4.
+  /// Plane hypotheses (m, cost), CV_32FC4: memory of the back end, until its next call.
   virtual cv::Mat hypotheses(int view) = 0;
   virtual void set_hypotheses(int view, const cv::Mat& hypotheses) = 0;
   /// What the check kernel wrote, CV_32FC4: relative difference, displacement (px), confidence,
-  /// reason bits.
+  /// reason bits; likewise.
   virtual cv::Mat checks(int view) = 0;
   /// Device time per kernel of the last run.
   virtual std::vector<KernelTime> times() const = 0;

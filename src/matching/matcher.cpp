@@ -17,32 +17,51 @@ namespace {
 
 kernel::vec4 to_vec4(const cv::Vec4f& v) { return {v[0], v[1], v[2], v[3]}; }
 
+/// Rows of new memory are written by many threads, which share the page faults as well.
+template <class OnRow>
+void for_rows(int rows, const OnRow& on_row) {
+  cv::parallel_for_(cv::Range(0, rows), [&](const cv::Range& range) {
+    for (int y = range.start; y < range.end; ++y) on_row(y);
+  });
+}
+
 /// Intensities with every pixel without a usable ray marked as masked.
 cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat& rays) {
   const std::string name = "The image of " + view.name;
   require_calibrated_size(image, view, name);
   cv::Mat intensity = to_intensity(image, name);
-  cv::Mat usable;
-  cv::extractChannel(rays, usable, 3);
-  intensity.setTo(MASKED_INTENSITY, usable == 0);
+  for_rows(intensity.rows, [&](int y) {
+    const auto* ray = rays.ptr<cv::Vec4f>(y);
+    float* pixel = intensity.ptr<float>(y);
+    for (int x = 0; x < intensity.cols; ++x) {
+      if (ray[x][3] == 0) pixel[x] = MASKED_INTENSITY;
+    }
+  });
   return intensity;
 }
 
 /// Distance, normal and cost maps of plane hypotheses; planes without a cost are left out.
-void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
-  const cv::Mat_<cv::Vec4f> hypotheses = result.hypotheses;
-  result.distance = cv::Mat::zeros(hypotheses.size(), CV_32FC1);
-  result.normals = cv::Mat::zeros(hypotheses.size(), CV_32FC3);
-  cv::extractChannel(hypotheses, result.cost, 3);
-  cv::parallel_for_(cv::Range(0, hypotheses.rows), [&](const cv::Range& rows) {
-    for (int y = rows.start; y < rows.end; ++y) {
-      for (int x = 0; x < hypotheses.cols; ++x) {
-        const kernel::vec4 hypothesis = to_vec4(hypotheses(y, x));
-        const float distance = kernel::plane_distance(hypothesis, to_vec4(rays(y, x)));
-        if (!(distance > 0)) continue;
-        const kernel::vec3 normal = kernel::plane_normal(hypothesis);
-        result.distance.at<float>(y, x) = distance;
-        result.normals.at<cv::Vec3f>(y, x) = {normal.x, normal.y, normal.z};
+void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& hypotheses, const cv::Mat_<cv::Vec4f>& rays,
+                       ViewResult& result) {
+  result.hypotheses.create(hypotheses.size(), CV_32FC4);
+  result.distance.create(hypotheses.size(), CV_32FC1);
+  result.normals.create(hypotheses.size(), CV_32FC3);
+  result.cost.create(hypotheses.size(), CV_32FC1);
+  for_rows(hypotheses.rows, [&](int y) {
+    const cv::Vec4f* ray = rays[y];
+    auto* held = result.hypotheses.ptr<cv::Vec4f>(y);
+    float* distance = result.distance.ptr<float>(y);
+    auto* normal = result.normals.ptr<cv::Vec3f>(y);
+    float* cost = result.cost.ptr<float>(y);
+    for (int x = 0; x < hypotheses.cols; ++x) {
+      held[x] = hypotheses(y, x);
+      cost[x] = held[x][3];
+      const kernel::vec4 hypothesis = to_vec4(held[x]);
+      distance[x] = kernel::plane_distance(hypothesis, to_vec4(ray[x]));
+      normal[x] = {0, 0, 0};
+      if (distance[x] > 0) {
+        const kernel::vec3 n = kernel::plane_normal(hypothesis);
+        normal[x] = {n.x, n.y, n.z};
       }
     }
   });
@@ -50,19 +69,29 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& rays, ViewResult& result) {
 
 void require_overlap(const std::vector<ViewResult>& views) {
   for (const ViewResult& view : views) {
-    if (cv::countNonZero(view.cost < INVALID_COST) > 0) return;
+    const auto has_cost = [](float cost) { return cost < INVALID_COST; };
+    if (std::any_of(view.cost.begin<float>(), view.cost.end<float>(), has_cost)) return;
   }
   throw Error(
       "The images do not overlap: no pixel of any view is seen by another one within the distance "
       "range; check the calibration, the order of the images, masks and the range.");
 }
 
-void unpack_checks(const cv::Mat& checks, ViewResult& result) {
-  std::vector<cv::Mat> channels;
-  cv::split(checks, channels);
-  cv::merge(std::vector<cv::Mat>{channels[0], channels[1]}, result.differences);
-  result.confidence = channels[2];
-  channels[3].convertTo(result.reasons, CV_16U);
+void unpack_checks(const cv::Mat_<cv::Vec4f>& checks, ViewResult& result) {
+  result.differences.create(checks.size(), CV_32FC2);
+  result.confidence.create(checks.size(), CV_32FC1);
+  result.reasons.create(checks.size(), CV_16UC1);
+  for_rows(checks.rows, [&](int y) {
+    const cv::Vec4f* check = checks[y];
+    auto* difference = result.differences.ptr<cv::Vec2f>(y);
+    float* confidence = result.confidence.ptr<float>(y);
+    auto* reasons = result.reasons.ptr<std::uint16_t>(y);
+    for (int x = 0; x < checks.cols; ++x) {
+      difference[x] = {check[x][0], check[x][1]};
+      confidence[x] = check[x][2];
+      reasons[x] = static_cast<std::uint16_t>(check[x][3]);
+    }
+  });
 }
 
 void add_work(std::vector<KernelTime>& times, const Schedule& schedule) {
@@ -142,8 +171,7 @@ class Matcher::Implementation {
     StereoResult result;
     for (std::size_t i = 0; i < images.size(); ++i) {
       ViewResult& view = result.views.emplace_back();
-      view.hypotheses = backend_->hypotheses(static_cast<int>(i));
-      unpack_hypotheses(rays_[i], view);
+      unpack_hypotheses(backend_->hypotheses(static_cast<int>(i)), rays_[i], view);
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
     }
     require_overlap(result.views);

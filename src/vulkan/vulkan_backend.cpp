@@ -51,15 +51,6 @@ cv::Size largest(std::span<const cv::Size> sizes) {
   return size;
 }
 
-VkDeviceSize largest_area(const std::vector<cv::Size>& sizes) {
-  VkDeviceSize area = 0;
-  for (const cv::Size& size : sizes) {
-    area = std::max(area,
-                    static_cast<VkDeviceSize>(size.width) * static_cast<VkDeviceSize>(size.height));
-  }
-  return area;
-}
-
 /// `sampled`: images are read as textures. Filters that the device lacks become exact.
 Pipelines make_pipelines(const VulkanContext& context, KernelConstants constants, bool sampled,
                          VkPipelineCache cache) {
@@ -334,7 +325,7 @@ cv::Mat VulkanBackend::download(const MapBuffer& map, int view) {
   barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();
-  return cv::Mat(size, CV_32FC4, staging_.mapped).clone();
+  return cv::Mat(size, CV_32FC4, staging_.mapped);
 }
 
 void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view, rays); }

@@ -196,7 +196,7 @@ TEST(CudaLaunches, PresetsAndModelsHaveKernelsOfTheirOwn) {
 TEST(CudaErrors, NameDeviceActionAndRemedy) {
   EXPECT_NO_THROW(check(cudaSuccess, "GPU", "work"));
   const std::string memory = error_of([] { check(cudaErrorMemoryAllocation, "GPU", "allocate"); });
-  EXPECT_THAT(memory, HasSubstr("GPU could not allocate: out of device memory; use smaller"));
+  EXPECT_THAT(memory, HasSubstr("GPU could not allocate: out of memory; use smaller"));
   EXPECT_THAT(explain(cudaErrorIllegalAddress), HasSubstr("lost"));
   EXPECT_THAT(explain(cudaErrorNoKernelImageForDevice), HasSubstr("CMAKE_CUDA_ARCHITECTURES"));
   for (const cudaError_t error :

@@ -79,7 +79,7 @@ std::vector<cv::Mat> run_up_to(Kernel last, Device& device, const RenderedPair& 
   backend->run(schedule, {});
   std::vector<cv::Mat> hypotheses;
   for (int i = 0; i < static_cast<int>(pair.views.size()); ++i) {
-    hypotheses.push_back(backend->hypotheses(i));
+    hypotheses.push_back(backend->hypotheses(i).clone());
   }
   return hypotheses;
 }

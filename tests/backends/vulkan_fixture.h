@@ -68,9 +68,11 @@ inline void upload(Backend& backend, KernelFixture& match) {
 inline cv::Mat download(Backend& backend, const Rig& rig) {
   cv::Mat all;
   for (int i = 0; i < static_cast<int>(rig.views.size()); ++i) {
-    for (const cv::Mat& map : {backend.hypotheses(i), backend.checks(i)}) {
+    const auto append = [&all](const cv::Mat& map) {
       all.push_back(map.reshape(1, static_cast<int>(map.total()) * 4));
-    }
+    };
+    append(backend.hypotheses(i));
+    append(backend.checks(i));
   }
   return all;
 }

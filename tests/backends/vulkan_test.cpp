@@ -123,7 +123,7 @@ TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
   EXPECT_GT(backend->device_bytes(), 45u * 45 * 2 * 52);
 
   // Planes of pixels that see the scene have a cost, and the checks ran.
-  const cv::Mat_<cv::Vec4f> planes = backend->hypotheses(1);
+  const cv::Mat_<cv::Vec4f> planes = backend->hypotheses(1).clone();
   const cv::Mat_<cv::Vec4f> checks = backend->checks(1);
   EXPECT_LT(planes(19, 19)[3], 1.0f);
   EXPECT_GT(cv::norm(cv::Vec3f(planes(19, 19).val)), 0.1);

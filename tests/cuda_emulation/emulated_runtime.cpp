@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <deque>
+#include <iterator>
 #include <map>
 #include <opencv2/core/utility.hpp>
 #include <set>
@@ -49,6 +50,17 @@ namespace {
 std::map<void*, std::size_t>& allocations() {
   static std::map<void*, std::size_t> map;
   return map;
+}
+/// Bytes of pinned host memory, by where it begins.
+std::map<void*, std::size_t>& pinned_memory() {
+  static std::map<void*, std::size_t> map;
+  return map;
+}
+bool is_pinned(void* memory) {
+  const auto after = pinned_memory().upper_bound(memory);
+  if (after == pinned_memory().begin()) return false;
+  const auto& [begin, bytes] = *std::prev(after);
+  return static_cast<char*>(memory) < static_cast<char*>(begin) + bytes;
 }
 std::set<CUstream_st*>& streams() {
   static std::set<CUstream_st*> set;
@@ -322,6 +334,22 @@ cudaError_t cudaFree(void* memory) {
   std::free(memory);
   return cudaSuccess;
 }
+cudaError_t cudaMallocHost(void** memory, std::size_t bytes) {
+  if (const cudaError_t error = step_outside_capture()) return error;
+  *memory = std::malloc(bytes);
+  std::memset(*memory, 0xcd, bytes);
+  pinned_memory()[*memory] = bytes;
+  ++emulation().live_objects;
+  return cudaSuccess;
+}
+cudaError_t cudaFreeHost(void* memory) {
+  if (memory == nullptr) return step();
+  run_everything();
+  pinned_memory().erase(memory);
+  --emulation().live_objects;
+  std::free(memory);
+  return cudaSuccess;
+}
 cudaError_t cudaMemsetAsync(void* memory, int value, std::size_t bytes, cudaStream_t stream) {
   if (const cudaError_t error = step_on(stream)) return error;
   enqueue(stream, [=] { std::memset(memory, value, bytes); });
@@ -336,6 +364,10 @@ cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from,
                               cudaMemcpyKind kind, cudaStream_t stream) {
   if (const cudaError_t error = step_on(stream)) return error;
   if (width > to_pitch || width > from_pitch) return cudaErrorInvalidValue;
+  if (kind == cudaMemcpyDeviceToHost && is_pinned(to)) {
+    enqueue(stream, [=] { copy_rows(to, to_pitch, from, from_pitch, width, height); });
+    return cudaSuccess;
+  }
   // Ordinary host memory is filled, or staged, before the call returns.
   if (kind == cudaMemcpyDeviceToHost) {
     run_all(*resolve(stream));

@@ -197,7 +197,7 @@ TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
     if (i < 2) backend->set_intensity(i, smooth_noise(sizes[i], 7));
   }
   backend->run(schedule, {});
-  const cv::Mat expected = backend->hypotheses(0);
+  const cv::Mat expected = backend->hypotheses(0).clone();
   Schedule other = schedule;
   for (Dispatch& dispatch : other.dispatches) ++dispatch.pass.seed;
   backend->run(other, {});
