@@ -50,9 +50,8 @@ enum class Filter : int {
 
 /// How planes are found.
 enum class SearchMethod : int {
-  random = 0,  ///< the paper's: random planes, four neighbours, halved random perturbations
-  pyramid =
-      1,  ///< sphere sweep, coarse to fine, strips in eight directions, local plane regression
+  random = 0,   ///< the paper's: random planes, four neighbours, halved random perturbations
+  pyramid = 1,  ///< sphere sweep, coarse to fine, eight strips, local plane regression
 };
 
 /// "exact" or "device".
