@@ -112,7 +112,7 @@ class Matcher {
   Matcher& operator=(Matcher&&) noexcept;
 
   /// One image per view: 8 or 16 bit, grey or colour. The same seed gives the same bits on one
-  /// device.
+  /// device. Throws Error for images that do not fit, and where no view sees what another one does.
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress = {});
   StereoResult match(const cv::Mat& left, const cv::Mat& right, const Progress& progress = {}) {
     return match(std::vector<cv::Mat>{left, right}, progress);
