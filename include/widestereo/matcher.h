@@ -53,7 +53,7 @@ struct ViewResult {
 /// do somewhat less. Regressions, which ask wider neighbourhoods where smaller ones do not tell,
 /// count with the fewest.
 struct KernelWork {
-  double samples = 0;  ///< patch samples, in each source view
+  double samples = 0;  ///< patch samples, those in all source views together
   /// Single-precision additions, multiplications, divisions, roots and elementary functions of
   /// patches and regressions; what else kernels compute is not counted.
   double operations = 0;
