@@ -26,7 +26,7 @@ enum class CalibrationFormat {
 
 struct Calibration {
   Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu, T_imu_cam, T_BS,
-            ///< body_T_cam0, IMU.T_b_c1
+            ///< body_T_cam0, IMU.T_b_c1, imuExtrinsics
   CalibrationFormat format = CalibrationFormat::kalibr;
 };
 
