@@ -48,7 +48,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
       "--masks", masks,
       "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
       "the pixel");
-  poses.add_to(command, "data sets need it, but of one frame", "Data sets");
+  poses.add_to(command, "data sets of more than one frame need it", "Data sets");
   frames.add_to(command);
   size.add_to(command);
   white_level.add_to(command);

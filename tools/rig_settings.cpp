@@ -24,8 +24,8 @@ void RigSettings::add_fields_of_view_to(CLI::App& command) {
   command
       .add_option(
           "--max-theta", max_theta,
-          "Half angle of the lens's field of view, degrees; by default as calibrated, else where "
-          "images turn black, if they do")
+          "Half angle of the lens's field of view, degrees; by default as calibrated, else, where "
+          "distances are matched, up to where images turn black, if they do")
       ->check(CLI::Range(1.0, 180.0));
 }
 

@@ -8,11 +8,8 @@
 
 namespace ws = widestereo;
 
-void SizeSettings::add_to(CLI::App& command) {
-  command
-      .add_option("--max-image-size", largest_side_,
-                  "Largest width and height to match at, pixels; larger images are reduced first, "
-                  "and results have their size then")
+void SizeSettings::add_to(CLI::App& command, const std::string& help) {
+  command.add_option("--max-image-size", largest_side_, help)
       ->check(CLI::Range(32, ws::largest_image_side));
 }
 

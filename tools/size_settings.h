@@ -10,8 +10,12 @@
 
 class SizeSettings {
  public:
+  static constexpr const char* of_a_match =
+      "Largest width and height to match at, pixels; larger images are reduced first, and results "
+      "have their size then";
+
   /// Adds --max-image-size.
-  void add_to(CLI::App& command);
+  void add_to(CLI::App& command, const std::string& help = of_a_match);
   /// A calibrated view as it is matched.
   widestereo::View reduced(const widestereo::View& calibrated) const;
   /// Its image likewise. Throws Error unless it has the calibrated size; `name` begins the message.

@@ -62,7 +62,9 @@ void add_view_synthesis_command(CLI::App& app) {
   command->add_option("other", a->other, "Another image, best one that took no part in matching")
       ->required();
   add_image_options(*command, a->rig, a->poses);
-  a->size.add_to(*command);
+  a->size.add_to(*command,
+                 "As it was given when the distances were matched: larger images are reduced to "
+                 "this width and height at most, pixels");
   a->white_level.add_to(*command);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");

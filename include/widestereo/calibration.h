@@ -26,7 +26,7 @@ enum class CalibrationFormat {
 
 struct Calibration {
   Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu, T_imu_cam, T_BS,
-            ///< body_T_cam0, IMU.T_b_c1
+            ///< body_T_cam0, IMU.T_b_c1, imuExtrinsics
   CalibrationFormat format = CalibrationFormat::kalibr;
 };
 
@@ -42,7 +42,7 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
 
 /// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg
 /// where the field of view is limited). Throws Error when there is no camera, one has no Kalibr
-/// form (skew, k3), or the file cannot be written.
+/// form (skew, k3, ...), or the file cannot be written.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
 /// Writes a Basalt JSON; T_imu_cam of view 0 is the identity where no IMU is known, and the IMU's

@@ -42,7 +42,7 @@ enum class CameraModel : int {
 /// Number of camera models, which are counted from 0.
 inline constexpr int camera_models = 13;
 
-/// The model's name as used in messages, JSON and --help, for example "kannala_brandt".
+/// The model's name as used in messages and JSON, for example "kannala_brandt".
 std::string to_string(CameraModel model);
 
 /// Intrinsics of one camera. Members that the model does not use stay at their defaults.

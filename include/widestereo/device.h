@@ -18,13 +18,13 @@ struct DevicePeaks {
 
 struct DeviceInfo {
   DeviceKind kind = DeviceKind::cpu;
-  std::string id;                    ///< what Device::open takes: "cpu", "vulkan:0", "cuda:0"
-  std::string name;                  ///< as the driver says
-  std::string type;                  ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu"
-  std::string driver;                ///< name and version, where known
-  std::string uuid;                  ///< 32 hexadecimal digits, empty for the CPU
-  std::string unusable;              ///< why the device cannot be used, empty if it can
-  DevicePeaks peaks;                 ///< known for CUDA devices only
+  std::string id;        ///< what Device::open takes: "cpu", "vulkan:0", "cuda:0"
+  std::string name;      ///< as the driver says
+  std::string type;      ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu", "other"
+  std::string driver;    ///< name and version, where known
+  std::string uuid;      ///< 32 hexadecimal digits, empty for the CPU
+  std::string unusable;  ///< why the device cannot be used, empty if it can
+  DevicePeaks peaks;     ///< known for CUDA devices only
   bool filters_intensities = false;  ///< its texture units can (Filter::device)
 };
 

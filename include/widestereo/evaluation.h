@@ -42,13 +42,13 @@ constexpr double edge_normal_step = 20;        ///< degrees
 constexpr double interior_edge_clearance = 8;  ///< pixels
 
 /// Scores over one set of pixels. Shares lie in [0, 1]; a pixel without prediction counts as bad.
-/// Shares, means and medians over no pixel at all are NaN (null in JSON).
+/// Shares, means and medians over no pixel at all are NaN (null in JSON), but for completeness.
 struct RegionScores {
   /// "all", "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg", and where there is an
   /// image "textured" and "textured interior" (textured, and not at an edge of the true scene).
   std::string region;
   long pixels = 0;          ///< pixels scored
-  double completeness = 0;  ///< share with a prediction
+  double completeness = 0;  ///< share with a prediction, 0 of no pixel
   std::map<double, double>
       bad_relative;  ///< threshold (0.005 = 0.5 %) -> share with larger relative error
   std::map<double, double>
@@ -148,7 +148,7 @@ std::vector<ReliabilityBin> reliability(const cv::Mat& distance, const cv::Mat& 
 std::string to_table(const std::vector<ReliabilityBin>& bins);
 std::string to_json(const std::vector<ReliabilityBin>& bins);
 
-/// BGR picture of the relative error: green <= 0.5 %, yellow about 2 %, red >= 5 %, blue = no
+/// BGR picture of the relative error: green <= 0.5 %, yellow 1.6 %, red >= 5 %, blue = no
 /// prediction, dimmed = occluded or outside the source view, black = no ground truth.
 cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth);
 

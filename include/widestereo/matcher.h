@@ -53,7 +53,7 @@ struct ViewResult {
 /// do somewhat less. Regressions, which ask wider neighbourhoods where smaller ones do not tell,
 /// count with the fewest.
 struct KernelWork {
-  double samples = 0;  ///< patch samples, in each source view
+  double samples = 0;  ///< patch samples, those in all source views together
   /// Single-precision additions, multiplications, divisions, roots and elementary functions of
   /// patches and regressions; what else kernels compute is not counted.
   double operations = 0;
@@ -112,7 +112,7 @@ class Matcher {
   Matcher& operator=(Matcher&&) noexcept;
 
   /// One image per view: 8 or 16 bit, grey or colour. The same seed gives the same bits on one
-  /// device.
+  /// device. Throws Error for images that do not fit, and where no view sees what another one does.
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress = {});
   StereoResult match(const cv::Mat& left, const cv::Mat& right, const Progress& progress = {}) {
     return match(std::vector<cv::Mat>{left, right}, progress);

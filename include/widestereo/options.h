@@ -50,9 +50,8 @@ enum class Filter : int {
 
 /// How planes are found.
 enum class SearchMethod : int {
-  random = 0,  ///< the paper's: random planes, four neighbours, halved random perturbations
-  pyramid =
-      1,  ///< sphere sweep, coarse to fine, strips in eight directions, local plane regression
+  random = 0,   ///< the paper's: random planes, four neighbours, halved random perturbations
+  pyramid = 1,  ///< sphere sweep, coarse to fine, eight strips, local plane regression
 };
 
 /// "exact" or "device".
@@ -149,7 +148,7 @@ struct Options {
   /// Pixels between min_distance and max_distance in the source view, 0..10000.
   double min_parallax = 0.5;
   double max_tilt = 85;  ///< degrees between normal and viewing ray, 0..90; the search keeps to it
-  /// Smallest share of the planes around (40 pixels wide) that put the pixel's point within a
+  /// Smallest share of the planes around (in 41x41 pixels) that put the pixel's point within a
   /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;
   /// Reject where a place 2, 4 or 8 source pixels away costs less by more than this, 0..2; 0 = not

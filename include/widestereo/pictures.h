@@ -28,8 +28,8 @@ cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range);
 cv::Mat normal_picture(const cv::Mat& normals);
 /// A map (CV_32FC1) between two values from dark to bright.
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high);
-/// Reason bits (CV_16UC1): the colour of the first bit set, the image (8 or 16 bit, grey, BGR or
-/// BGRA) where accepted.
+/// Reason bits (CV_16UC1): the colour of filled pixels, else of the first bit set, the image (8 or
+/// 16 bit, grey, BGR or BGRA) where accepted.
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
 
 /// A cloud in its own colours as a pinhole camera of 90 degrees across sees it from

@@ -43,8 +43,8 @@ RenderedPair render_demo(int size, std::uint32_t seed = 1);
 RenderedPair render_demo_from(const Eigen::Isometry3d& world_from_rig, int size,
                               std::uint32_t seed = 1);
 
-/// The same room seen by another rig, anywhere between its walls: 4 m wide (x), 2.4 m high (y) and
-/// 5 m long (z), the demo's first camera at the origin.
+/// The same room seen by another rig, anywhere between its walls: 5.4 m wide (x), 2.5 m high (y)
+/// and 5.6 m long (z), the demo's first camera at the origin.
 RenderedPair render_demo_room(const Rig& rig, std::uint32_t seed = 1);
 
 /// Nearest and farthest distance (metres) that suit the demo scene.

@@ -48,7 +48,7 @@ Camera rational_camera(const Document& document, const std::string& what,
 /// Focal lengths, skew and centre of a camera matrix.
 void set_matrix(Camera& camera, const Eigen::Matrix3d& k);
 
-/// The same camera in the model with the fewest coefficients: without those that are 0.
+/// The same camera in a simpler model, where what a rational or thin prism model has more is 0.
 Camera simplified(Camera camera);
 
 /// The rotation nearest to a matrix (orthonormal but for rounding) and a translation as a rigid

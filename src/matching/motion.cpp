@@ -51,7 +51,7 @@ struct ScaledView {
   }
 };
 
-struct Normals {
+struct NormalEquations {
   Eigen::MatrixXd information;
   Eigen::VectorXd gradient;
   double cost = 0;      ///< mean robust cost per point
@@ -135,38 +135,38 @@ class Alignment {
         brightness_(rig.views.size(), {1, 0}) {}
 
   void refine(const std::vector<ScaledView>& views) {
-    Normals normals = linearise(views);
-    for (int step = 0; step < most_steps && normals.points >= fewest_points; ++step) {
-      const Eigen::VectorXd update = solve(normals);
+    NormalEquations equations = linearise(views);
+    for (int step = 0; step < most_steps && equations.points >= fewest_points; ++step) {
+      const Eigen::VectorXd update = solve(equations);
       if (!update.allFinite()) return;
       const auto before = std::pair(motion_, brightness_);
       apply(update);
-      const Normals next = linearise(views);
-      if (next.points < fewest_points || next.cost > normals.cost) {
+      const NormalEquations next = linearise(views);
+      if (next.points < fewest_points || next.cost > equations.cost) {
         std::tie(motion_, brightness_) = before;
         return;
       }
-      if (next.cost >= normals.cost * (1 - least_gain)) return;
-      normals = next;
+      if (next.cost >= equations.cost * (1 - least_gain)) return;
+      equations = next;
     }
   }
 
   /// Whether every direction of motion is determined.
   bool is_determined(const std::vector<ScaledView>& views) {
-    const Normals normals = linearise(views);
-    if (normals.points < fewest_points) return false;
-    const Eigen::Index others = normals.information.rows() - 6;
-    Eigen::MatrixXd brightness = normals.information.bottomRightCorner(others, others);
+    const NormalEquations equations = linearise(views);
+    if (equations.points < fewest_points) return false;
+    const Eigen::Index others = equations.information.rows() - 6;
+    Eigen::MatrixXd brightness = equations.information.bottomRightCorner(others, others);
     brightness.diagonal().array() += 1e-9;
-    const Eigen::MatrixXd shared = normals.information.topRightCorner(6, others);
-    Eigen::Matrix<double, 6, 6> of_motion = normals.information.topLeftCorner<6, 6>() -
+    const Eigen::MatrixXd shared = equations.information.topRightCorner(6, others);
+    Eigen::Matrix<double, 6, 6> of_motion = equations.information.topLeftCorner<6, 6>() -
                                             shared * brightness.ldlt().solve(shared.transpose());
     Eigen::Matrix<double, 6, 1> units;
     units << 1, 1, 1, Eigen::Vector3d::Constant(median_distance());
     of_motion = units.asDiagonal() * of_motion * units.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(of_motion);
     const double weakest = solver.eigenvalues().minCoeff();
-    return normals.variance < weakest * largest_uncertainty * largest_uncertainty;
+    return equations.variance < weakest * largest_uncertainty * largest_uncertainty;
   }
 
   const Eigen::Isometry3d& motion() const { return motion_; }
@@ -180,7 +180,7 @@ class Alignment {
     Unknowns by;  ///< its derivatives
   };
 
-  struct ViewNormals {
+  struct ViewEquations {
     Eigen::Matrix<double, 8, 8> information = Eigen::Matrix<double, 8, 8>::Zero();
     Unknowns gradient = Unknowns::Zero();
     double cost = 0;
@@ -223,56 +223,58 @@ class Alignment {
     }
   }
 
-  static ViewNormals normals_of(const std::vector<Row>& rows, double deviation) {
-    ViewNormals normals;
+  static ViewEquations equations_of(const std::vector<Row>& rows, double deviation) {
+    ViewEquations equations;
     for (const Row& row : rows) {
       // Large where something moves by itself or was occluded.
       const double doubt = doubt_of(row.residual, deviation);
       const Unknowns weighted = row.by / (doubt * doubt);
-      normals.information.noalias() += weighted * row.by.transpose();
-      normals.gradient += row.residual * weighted;
-      normals.cost += row.residual * row.residual / doubt;
+      equations.information.noalias() += weighted * row.by.transpose();
+      equations.gradient += row.residual * weighted;
+      equations.cost += row.residual * row.residual / doubt;
     }
-    return normals;
+    return equations;
   }
 
-  Normals linearise(const std::vector<ScaledView>& views) {
+  NormalEquations linearise(const std::vector<ScaledView>& views) {
     for_each_view(views.size(), [&](std::size_t i) { set_rows(i, views[i]); });
     const Eigen::Index unknowns = 6 + 2 * static_cast<Eigen::Index>(views.size());
-    Normals normals;
-    normals.information = Eigen::MatrixXd::Zero(unknowns, unknowns);
-    normals.gradient = Eigen::VectorXd::Zero(unknowns);
+    NormalEquations equations;
+    equations.information = Eigen::MatrixXd::Zero(unknowns, unknowns);
+    equations.gradient = Eigen::VectorXd::Zero(unknowns);
     std::vector<double> sizes;
     for (const std::vector<Row>& rows : rows_) {
       for (const Row& row : rows) sizes.push_back(std::abs(row.residual));
     }
-    normals.points = sizes.size();
-    if (sizes.empty()) return normals;
+    equations.points = sizes.size();
+    if (sizes.empty()) return equations;
     const double deviation = deviations_per_median * percentile(sizes, 0.5) + 1e-4;
-    normals.variance = deviation * deviation;
-    std::vector<ViewNormals> normals_of_views(views.size());
-    for_each_view(views.size(),
-                  [&](std::size_t i) { normals_of_views[i] = normals_of(rows_[i], deviation); });
+    equations.variance = deviation * deviation;
+    std::vector<ViewEquations> equations_of_views(views.size());
+    for_each_view(views.size(), [&](std::size_t i) {
+      equations_of_views[i] = equations_of(rows_[i], deviation);
+    });
     for (std::size_t i = 0; i < views.size(); ++i) {
-      const ViewNormals& of_view = normals_of_views[i];
+      const ViewEquations& of_view = equations_of_views[i];
       const Eigen::Index place = 6 + 2 * static_cast<Eigen::Index>(i);
-      normals.information.topLeftCorner<6, 6>() += of_view.information.topLeftCorner<6, 6>();
-      normals.information.block<6, 2>(0, place) = of_view.information.topRightCorner<6, 2>();
-      normals.information.block<2, 6>(place, 0) = of_view.information.bottomLeftCorner<2, 6>();
-      normals.information.block<2, 2>(place, place) = of_view.information.bottomRightCorner<2, 2>();
-      normals.gradient.head<6>() += of_view.gradient.head<6>();
-      normals.gradient.segment<2>(place) = of_view.gradient.tail<2>();
-      normals.cost += of_view.cost;
+      equations.information.topLeftCorner<6, 6>() += of_view.information.topLeftCorner<6, 6>();
+      equations.information.block<6, 2>(0, place) = of_view.information.topRightCorner<6, 2>();
+      equations.information.block<2, 6>(place, 0) = of_view.information.bottomLeftCorner<2, 6>();
+      equations.information.block<2, 2>(place, place) =
+          of_view.information.bottomRightCorner<2, 2>();
+      equations.gradient.head<6>() += of_view.gradient.head<6>();
+      equations.gradient.segment<2>(place) = of_view.gradient.tail<2>();
+      equations.cost += of_view.cost;
     }
-    normals.cost /= static_cast<double>(normals.points);
-    return normals;
+    equations.cost /= static_cast<double>(equations.points);
+    return equations;
   }
 
-  static Eigen::VectorXd solve(const Normals& normals) {
-    Eigen::MatrixXd damped = normals.information;
+  static Eigen::VectorXd solve(const NormalEquations& equations) {
+    Eigen::MatrixXd damped = equations.information;
     damped.diagonal() *= 1 + 1e-6;
     damped.diagonal().array() += 1e-9;
-    return -damped.ldlt().solve(normals.gradient);
+    return -damped.ldlt().solve(equations.gradient);
   }
 
   void apply(const Eigen::VectorXd& update) {
