@@ -15,7 +15,7 @@
 #define CURVATURE_STEP 4
 #define CURVATURE_BESIDE 6
 // Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
-// standard deviation of half a grey level; its inverse.
+// standard deviation of 0.44 grey levels; its inverse.
 #define PER_CERTAIN_CURVATURE 3.3e5f
 // Largest variance that is taken for noise, of two grey levels: more may be fine texture.
 #define LARGEST_NOISE 6e-5f
