@@ -217,13 +217,16 @@ TEST(Motion, IsFoundToAFractionOfAPixel) {
     const std::vector<cv::Mat> same = images_of(render_demo_from(now, size));
     std::vector<cv::Mat> brighter(same.size());
     for (std::size_t i = 0; i < same.size(); ++i) same[i].convertTo(brighter[i], -1, 0.8, 12);
+    std::vector<cv::Mat> unlike(same.size());  // one camera exposes longer, the other one less long
+    same[0].convertTo(unlike[0], -1, 1.15, 8);
+    same[1].convertTo(unlike[1], -1, 0.6, -5);
     std::vector<cv::Mat> passed_by;  // by something that moves by itself
     for (const cv::Mat& image : same) {
       const cv::Rect around(30, 30, 24, 24);
       passed_by.push_back(image.clone());
       cv::flip(image(around), passed_by.back()(around), 1);
     }
-    for (const auto& images : {same, brighter, passed_by}) {
+    for (const auto& images : {same, brighter, unlike, passed_by}) {
       SCOPED_TRACE(steps);
       const auto motion =
           estimate_motion(frame(0).rig, images_of(frame(0)), true_planes(frame(0)), images);
@@ -247,6 +250,11 @@ TEST(Motion, IsNotInventedWhereNothingShowsIt) {
                                 true_planes(frame(0)), grey);
               }),
               HasSubstr("cam1"));
+  EXPECT_THAT(error_of([&] {
+                estimate_motion(frame(0).rig, grey, true_planes(frame(0)),
+                                {grey[0], grey[1](cv::Rect(0, 0, 9, 9))});
+              }),
+              HasSubstr("The image of cam1 is 9x9"));
 }
 
 }  // namespace

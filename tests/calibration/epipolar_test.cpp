@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -97,6 +98,64 @@ TEST(Epipolar, TellsHowManyMatchesAreOffAndHowManyLieBehind) {
     std::swap(matches[i].first, matches[i].second);
   }
   EXPECT_EQ(check_epipolar(rig.views[0], rig.views[1], matches).behind, 0.25);
+}
+
+TEST(Epipolar, DistancesAreFromTheFirstCameraHoweverTheSecondIsTurned) {
+  const Rig rig = rig_with_rotation_error(25);
+  const std::vector<PixelMatch> matches = exact_matches(rig);
+  std::vector<double> distances;
+  for (const PixelMatch& match : matches) {
+    Eigen::Vector3d first, second;
+    ASSERT_TRUE(unproject(rig.views[0].camera, match.first, first));
+    ASSERT_TRUE(unproject(rig.views[1].camera, match.second, second));
+    // first * distance = centre + second * its distance, by least squares
+    Eigen::Matrix<double, 3, 2> rays;
+    rays << first, -(rig.views[1].world_from_camera.linear() * second);
+    distances.push_back(
+        (rays.transpose() * rays).ldlt().solve(rays.transpose() * Eigen::Vector3d(0.1, 0, 0)).x());
+  }
+  std::sort(distances.begin(), distances.end());
+  const EpipolarReport report = check_epipolar(rig.views[0], rig.views[1], matches);
+  EXPECT_LT(report.median_pixels, 1e-6);
+  EXPECT_EQ(report.behind, 0);
+  // Ranks of the percentiles may be counted in different ways.
+  EXPECT_NEAR(report.nearest, distances[20], distances[22] - distances[18]);
+  EXPECT_NEAR(report.typical, distances[200], distances[202] - distances[198]);
+  EXPECT_NEAR(report.farthest, distances[380], distances[382] - distances[378]);
+}
+
+/// At infinity noise alone makes half of all points lie behind.
+TEST(Epipolar, FarMatchesTellNoDistance) {
+  const Rig rig = rig_with_rotation_error(25);
+  std::vector<PixelMatch> matches = exact_matches(rig);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    Eigen::Vector3d ray;
+    ASSERT_TRUE(unproject(rig.views[0].camera, matches[i].first, ray));
+    const Eigen::Vector3d turned = rig.views[1].world_from_camera.linear().transpose() * ray;
+    ASSERT_TRUE(project(rig.views[1].camera, turned, matches[i].second));
+    matches[i].second.x() += i % 2 == 0 ? 0.2 : -0.2;
+  }
+  const EpipolarReport report = check_epipolar(rig.views[0], rig.views[1], matches);
+  EXPECT_EQ(report.matches, 400);
+  EXPECT_EQ(report.behind, 0);
+  EXPECT_EQ(report.nearest, 0);
+  EXPECT_EQ(report.farthest, 0);
+}
+
+TEST(Epipolar, FalseMatchesTellNoDistance) {
+  const Rig rig = rig_with_rotation_error(0);
+  const std::vector<PixelMatch> right = exact_matches(rig);
+  std::vector<PixelMatch> matches = right;
+  std::erase_if(matches, [](const PixelMatch& match) {
+    return (match.second - Eigen::Vector2d(255, 255)).norm() > 60;
+  });
+  for (PixelMatch& match : matches) match.second += Eigen::Vector2d(-60, 12);  // as if near
+  matches.insert(matches.end(), right.begin(), right.end());
+  const EpipolarReport expected = check_epipolar(rig.views[0], rig.views[1], right);
+  const EpipolarReport report = check_epipolar(rig.views[0], rig.views[1], matches);
+  EXPECT_GT(report.matches, 410);
+  EXPECT_EQ(report.nearest, expected.nearest);
+  EXPECT_EQ(report.typical, expected.typical);
 }
 
 TEST(Epipolar, LeavesOutWhatIsMasked) {

@@ -148,6 +148,7 @@ TEST(RigRefinement, FindsIntrinsicsWhereAsked) {
     EXPECT_NEAR(camera.cx, truth.views[view].camera.cx, 0.05);
     EXPECT_NEAR(camera.cy, truth.views[view].camera.cy, 0.05);
     EXPECT_NEAR(refined.views[view].focal_length.change, 0.5, 0.02);
+    EXPECT_NEAR(refined.views[view].principal_point.change, std::hypot(1.2, 0.8), 0.1);
     EXPECT_LT(rotation_error(refined.rig, truth, view), 0.02);
   }
   EXPECT_LT(refined.after[0].median_pixels,
@@ -246,6 +247,18 @@ TEST(RigRefinement, MatchesOfOtherViewsAreRefused) {
   EXPECT_NE(error(displaced(truth, 4), matches_of(truth, {.noise = 0.2}))
                 .find("turn cam1 by 4.0 degrees, more than the 2.5 that are believed"),
             std::string::npos);
+  // Seen in another direction, but turned as calibrated.
+  const auto moved = [&](double degrees) {
+    Rig rig = truth;
+    const Eigen::Vector3d to_cam1 = arm(rig, 1);
+    rig.views[1].world_from_camera.translation() +=
+        turned(degrees, to_cam1.unitOrthogonal()) * to_cam1 - to_cam1;
+    return error(rig, matches_of(truth, {.noise = 0.2}));
+  };
+  EXPECT_EQ(moved(6), "");
+  const std::string far_off = moved(14);
+  EXPECT_NE(far_off.find("turn the direction to cam1 by 1"), std::string::npos) << far_off;
+  EXPECT_NE(far_off.find("more than the 10.0 that are believed"), std::string::npos) << far_off;
   // The cameras stand the other way around, as if images had been swapped.
   Rig opposite = truth;
   for (View& view : opposite.views) {
@@ -292,7 +305,7 @@ TEST(RigRefinement, PairsThatSeeNothingInCommonAreLeftOut) {
   const Rig truth = true_rig();
   const Rig calibrated = displaced(truth, 0.4);
   const std::vector<ViewMatches> all = matches_of(truth, {.noise = 0.1});
-  for (const int count : {0, 5, 300}) {
+  for (const int count : {0, 5, 300, 3000}) {
     std::vector<ViewMatches> matches = all;
     matches[1].matches = false_matches(count);  // view 2 is seen by view 1 alone
     const RigRefinement refined = refine_rig(calibrated, matches);
@@ -308,6 +321,15 @@ TEST(RigRefinement, PairsThatSeeNothingInCommonAreLeftOut) {
       EXPECT_LT(rotation_error(refined.rig, truth, view), 0.02) << count;
     }
   }
+}
+
+TEST(RigRefinement, ViewsMayBeConnectedByOthersInAnyOrder) {
+  const Rig truth = true_rig();
+  std::vector<ViewMatches> matches = matches_of(truth, {});
+  matches.erase(matches.begin() + 1);  // view 2 is seen by view 1 alone
+  std::swap(matches[0], matches[1]);
+  const RigRefinement refined = refine_rig(displaced(truth, 0.4), matches);
+  EXPECT_LT(rotation_error(refined.rig, truth, 2), 1e-3);
 }
 
 TEST(RigRefinement, ViewsThatNothingConnectsAreNamed) {

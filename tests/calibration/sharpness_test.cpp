@@ -134,6 +134,21 @@ TEST(Sharpness, DetailOfAnotherSizeIsNone) {
   EXPECT_FALSE(compare_sharpness(view(), view(0, 360), image, large, matches));
   EXPECT_TRUE(compare_sharpness(view(), view(), image, large, matches))
       << "what a wrong calibration says: the test would see a difference";
+  for (PixelMatch& match : matches) std::swap(match.first, match.second);
+  EXPECT_FALSE(compare_sharpness(view(0, 360), view(), large, image, matches));
+}
+
+/// A camera of twice the focal length sees a wall from twice as far away as large.
+TEST(Sharpness, DetailOfOneSizeCountsFromAnyDistance) {
+  std::vector<PixelMatch> matches = grid();
+  for (PixelMatch& match : matches) match.second = match.first;
+  View far = view(0, 360);
+  far.world_from_camera.translation().z() = -1;
+  const auto found = compare_sharpness(view(), far, grey_levels(scene()),
+                                       grey_levels(blurred(scene(), 1.5)), matches);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->sharper, 0);
+  EXPECT_NEAR(found->blur, 1.5, 0.1);
 }
 
 TEST(Sharpness, MaskedFeaturesDoNotCount) {

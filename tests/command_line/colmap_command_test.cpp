@@ -180,6 +180,10 @@ TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
   EXPECT_NE(bytes_of("out/cloud.ply").find("element vertex " + std::to_string(points) + "\n"),
             std::string::npos);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/cloud_preview.png"));
+  // One view will do, but only accepted pixels.
+  ASSERT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
+  const cv::Mat of_second = cv::imread(file("pair/distance_accepted1.tiff"), cv::IMREAD_UNCHANGED);
+  EXPECT_LE(record()["cloud"]["points"], cv::countNonZero(accepted) + cv::countNonZero(of_second));
 }
 
 /// Positions are exact in binary in both places, so that single precision alone could differ.

@@ -429,6 +429,16 @@ TEST_F(FewerBits, AreStretchedByEveryCommand) {
     EXPECT_NE(run(arguments).output.find(advice), std::string::npos) << arguments;
     expect_error(arguments + "--white-level 255", "above the white level 255");
   }
+  // Of each image.
+  cv::imwrite(file("dim16.png"), image);
+  for (const std::string& command :
+       {std::string("calibration check "), "view-synthesis " + file("far.tiff ")}) {
+    for (const std::string& images :
+         {file("left16.png ") + file("dim16.png "), file("dim16.png ") + file("left16.png ")}) {
+      expect_error(command + images + "-c " + file("calib.yaml") + " --white-level 255",
+                   "left16.png has the value");
+    }
+  }
 }
 
 TEST_F(Command, UnknownCommandsAreNamed) {
@@ -550,7 +560,10 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   expect_error("evaluate " + file("prediction.tiff"), "--truth");
   cv::imwrite(file("half.tiff"), prediction(cv::Rect(0, 0, 48, 96)));
   expect_error("evaluate " + file("half.tiff") + common, "48x96");
-  expect_error("evaluate " + file("prediction.tiff") + common + " --source 7", "--source");
+  for (const char* source : {"7", "0", "-1"}) {
+    expect_error("evaluate " + file("prediction.tiff") + common + " --source " + source,
+                 "choose two different ones by --view and --source");
+  }
 }
 
 TEST_F(Command, CalibrationShowsConvertsAndChecks) {
@@ -585,6 +598,41 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   outcome = run("calibration check " + file("left.png") + " " + file("right.png") + " -c " +
                 file("calib.yaml") + " --json");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+}
+
+/// A wide pinhole camera, and another one beside it that is turned a quarter about the axis.
+TEST_F(Command, CalibrationShowsFieldsOfViewAndWhereCamerasStand) {
+  folder_.write("wide.yaml", R"(cam0:
+  camera_model: pinhole
+  intrinsics: [50.0, 50.0, 150.0, 50.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [301, 101]
+cam1:
+  T_cn_cnm1:
+  - [0.0, 1.0, 0.0, 0.0]
+  - [-1.0, 0.0, 0.0, 0.1]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  intrinsics: [50.0, 50.0, 150.0, 50.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [301, 101]
+)");
+  const Outcome outcome = run("calibration show " + file("wide.yaml") + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json shown = nlohmann::json::parse(outcome.output);
+  const nlohmann::json& view = shown["views"][0];
+  const auto degrees = [](double tangent) { return 2 * std::atan(tangent) * 180 / M_PI; };
+  EXPECT_NEAR(view["horizontal_field_of_view_degrees"], degrees(150 / 50.), 1e-6);
+  EXPECT_NEAR(view["vertical_field_of_view_degrees"], degrees(50 / 50.), 1e-6);
+  EXPECT_NEAR(view["diagonal_field_of_view_degrees"], degrees(std::hypot(150, 50) / 50), 0.5);
+  const nlohmann::json& pair = shown["pairs"][0];
+  EXPECT_NEAR(pair["baseline_metres"], 0.1, 1e-12);
+  EXPECT_NEAR(pair["rotation_degrees"], 90, 1e-9);
+  EXPECT_NEAR(pair["direction_in_first"][0], 1, 1e-12);
+  EXPECT_NEAR(pair["direction_in_first"][1], 0, 1e-12);
 }
 
 TEST_F(Command, DarkRimsAreLeftOut) {
@@ -698,7 +746,33 @@ TEST_F(Command, CalibrationIsRefined) {
         .get<double>();
   };
   EXPECT_EQ(median("turned.yaml"), json["pairs"][0]["median_pixels_before"]);
+  const auto verdict = [&](const std::string& calibration) {
+    return run("calibration check " + pair + "-c " + file(calibration)).output;
+  };
+  EXPECT_NE(verdict("refined.json").find("calibration: good\n"), std::string::npos);
+  EXPECT_EQ(verdict("turned.yaml").find("calibration: good"), std::string::npos);
+  // Turned by twelve degrees.
+  folder_.write("far_off.yaml", replaced(bytes_of("calib.yaml"), rows,
+                                         "[0.0, 0.97814760, -0.20791169, 0.0]\n"
+                                         "  - [0.0, 0.20791169, 0.97814760, 0.0]"));
+  EXPECT_NE(verdict("far_off.yaml").find("too inaccurate for stereo: calibrate again\n"),
+            std::string::npos);
   EXPECT_NEAR(median("refined.json"), json["pairs"][0]["median_pixels_after"].get<double>(), 1e-6);
+  for (const bool intrinsics : {false, true}) {
+    outcome =
+        run(refine + " --json -o " + file("again.yaml") + (intrinsics ? " --intrinsics" : ""));
+    EXPECT_EQ(nlohmann::json::parse(
+                  outcome.output)["views"][1]["focal_length_percent"]["deviation"] > 0.0,
+              intrinsics);
+  }
+  // Of a second frame that shows nothing no features are added.
+  cv::imwrite(file("flat.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(7)));
+  const std::string flat = file("flat.png") + " " + file("flat.png") + " ";
+  outcome = run("calibration refine " + pair + flat + "-c " + file("turned.yaml") + " --json -o " +
+                file("again.yaml"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(2 * nlohmann::json::parse(outcome.output)["pairs"][0]["matches"].get<int>(),
+            json["pairs"][0]["matches"]);
   outcome = run(refine + " --intrinsics -o " + file("refined.yaml"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("cam1  f by "), std::string::npos) << outcome.output;
@@ -769,6 +843,13 @@ TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
       << outcome.output;
   outcome = run(calibration("check", "left.png", "right.png"));
   EXPECT_NE(outcome.output.find("half below "), std::string::npos) << outcome.output;
+  const nlohmann::json right_order =
+      nlohmann::json::parse(run(calibration("check", "left.png", "right.png") + "--json").output);
+  EXPECT_GT(right_order["distance_p5"], 0.05);
+  EXPECT_GT(right_order["distance_p50"], right_order["distance_p5"]);
+  EXPECT_GT(right_order["distance_p95"], right_order["distance_p50"]);
+  cv::imwrite(file("small.png"), cv::Mat(9, 8, CV_8UC1, cv::Scalar(7)));
+  expect_error(calibration("check", "left.png", "small.png"), "small.png is 8x9 pixels");
   outcome = run(calibration("check", "left.png", "left.png"));
   EXPECT_NE(outcome.output.find("no feature is near enough"), std::string::npos) << outcome.output;
   outcome = run(calibration("check", "left.png", "left.png") + "--json");

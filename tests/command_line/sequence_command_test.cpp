@@ -293,8 +293,19 @@ TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
   EXPECT_EQ(frames[1]["start"], "cold after warm") << frames.dump(1);
   const Outcome alone = run(cold_sequence("alone") + "--no-warm-start --count 2");
   ASSERT_EQ(alone.exit_code, 0) << alone.output;
+  EXPECT_GT(frames[1]["patch_samples"], record("alone")["frames"][1]["patch_samples"])
+      << "what was in vain counts";
   EXPECT_EQ(bytes_of(folder_ / "out/001/distance0.tiff"),
             bytes_of(folder_ / "alone/001/distance0.tiff"));
+}
+
+TEST_F(SequenceCommand, ASceneCutIsNoticedWhereARunWasResumed) {
+  add_frame(0, "002", 8);
+  const std::string options = "--no-motion --restart-below 0.9 ";
+  ASSERT_EQ(run(sequence() + options + "--count 2").exit_code, 0);
+  ASSERT_EQ(record()["frames"][1]["start"], "warm") << record()["frames"];
+  ASSERT_EQ(run(sequence() + options).exit_code, 0);
+  EXPECT_EQ(record()["frames"][2]["start"], "cold after warm") << record()["frames"];
 }
 
 TEST_F(SequenceCommand, BlackFramesNeitherStartOthersNorHideSceneCuts) {

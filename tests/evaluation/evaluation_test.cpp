@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -66,6 +67,65 @@ TEST_F(FourPixels, EveryFigureIsAsCountedByHand) {
   EXPECT_TRUE(std::isnan(all.mean_normal_angle));
   EXPECT_EQ(scores[2].pixels, 4) << "all within 30 degrees";
   EXPECT_EQ(scores[5].pixels, 0);
+}
+
+TEST_F(FourPixels, MediansOfAnEvenNumberAreBetweenTheMiddleTwo) {
+  cv::Mat distance = truth_.distance.clone();
+  cv::Mat_<float>({1, 4}, {2, 2.02f, 2.06f, 2.4f}).copyTo(distance.row(0));
+  const RegionScores all = evaluate(distance, {}, truth_, reference_, source_)[0];
+  EXPECT_NEAR(all.median_absolute, 0.04, 1e-6);
+  EXPECT_NEAR(all.median_relative, 0.02, 1e-6);
+  EXPECT_NEAR(all.mean_absolute, 0.12, 1e-6);
+}
+
+TEST_F(FourPixels, MissingNormalsDoNotCount) {
+  const auto tilted = [](double degrees) {
+    return cv::Vec3f(static_cast<float>(std::sin(degrees * M_PI / 180)), 0,
+                     static_cast<float>(-std::cos(degrees * M_PI / 180)));
+  };
+  truth_.normals = cv::Mat(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
+  cv::Mat normals = cv::Mat::zeros(2, 4, CV_32FC3);
+  normals.at<cv::Vec3f>(0, 0) = tilted(10);
+  normals.at<cv::Vec3f>(0, 1) = tilted(20);
+  normals.at<cv::Vec3f>(0, 3) = tilted(60);
+  const RegionScores all = evaluate(truth_.distance, normals, truth_, reference_, source_)[0];
+  EXPECT_NEAR(all.mean_normal_angle, 30, 1e-4);
+  EXPECT_NEAR(all.median_normal_angle, 20, 1e-4);
+}
+
+TEST_F(FourPixels, ThePixelOnTheAxisIsWithin30Degrees) {
+  reference_.camera.cx = 1;
+  reference_.camera.cy = 0;
+  EXPECT_EQ(evaluate(truth_.distance, {}, truth_, reference_, source_)[2].pixels, 4);
+}
+
+/// No two of the figures are the same.
+TEST_F(FourPixels, EveryFigureIsInItsColumnAndUnderItsKey) {
+  cv::Mat distance = truth_.distance.clone();
+  cv::Mat_<float>({1, 4}, {0, 2.004f, 2.06f, 2.4f}).copyTo(distance.row(0));
+  truth_.normals = cv::Mat(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
+  cv::Mat normals(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
+  normals.at<cv::Vec3f>(0, 3) = {1, 0, 0};
+  const std::vector<RegionScores> scores = evaluate(distance, normals, truth_, reference_, source_);
+  const RegionScores& all = scores[0];
+  const nlohmann::json json = nlohmann::json::parse(to_json(scores))[0];
+  EXPECT_EQ(json["median_pixels"], all.median_pixels);
+  EXPECT_EQ(json["median_relative"], all.median_relative);
+  EXPECT_EQ(json["median_absolute"], all.median_absolute);
+  EXPECT_EQ(json["mean_absolute"], all.mean_absolute);
+  EXPECT_EQ(json["root_mean_square"], all.root_mean_square);
+  EXPECT_EQ(json["mean_normal_angle"], all.mean_normal_angle);
+  EXPECT_EQ(json["median_normal_angle"], all.median_normal_angle);
+  EXPECT_EQ(json["bad_relative"]["0.02"], 3 / 4.0);
+  EXPECT_EQ(json["bad_relative_predicted"]["0.02"], 2 / 3.0);
+  EXPECT_EQ(json["bad_pixels"]["2.0"], 2 / 4.0);
+  EXPECT_EQ(json["bad_pixels_predicted"]["2.0"], 1 / 3.0);
+  // Errors of 4, 60 and 400 mm; z = 2.06 m is 100 / 2 - 100 / 2.06 = 1.456 px off.
+  EXPECT_THAT(
+      to_table(scores),
+      ::testing::HasSubstr("all                      4  75.0% |  75.0%  75.0%  75.0%  50.0% |"
+                           "  75.0%  75.0%  50.0% |   1.456   3.000  0.1547  0.2335 |   0.0"
+                           "  30.0\n"));
 }
 
 TEST_F(FourPixels, OcclusionAndNormalsCount) {
@@ -275,11 +335,11 @@ TEST(Evaluation, TruthScoresPerfectlyInEveryBand) {
 TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   const cv::Mat cost = (cv::Mat_<float>(1, 4) << 0.1f, 0.3f, 0.1f, 2);
   cv::Mat differences(1, 4, CV_32FC2, cv::Scalar(0, 0));
-  differences.at<cv::Vec2f>(0, 1) = {0.05f, 1.5f};
+  differences.at<cv::Vec2f>(0, 1) = {0.01f, 1.5f};
   differences.at<cv::Vec2f>(0, 2) = {1000, 1000};
   const ConsistencyScores s = consistency_scores(differences, cost);
   EXPECT_EQ(s.pixels, 3);
-  EXPECT_NEAR(s.consistent_relative, 1 / 3.0, 1e-9);
+  EXPECT_NEAR(s.consistent_relative, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.consistent_pixels, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.low_cost, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.mean_cost, 0.5 / 3, 1e-6);
@@ -364,6 +424,37 @@ TEST_F(FourPixels, ConfidencesAreProbabilities) {
   }
 }
 
+TEST_F(FourPixels, SparsificationKeepsTheSurestPixels) {
+  cv::Mat distance = truth_.distance.clone();
+  cv::Mat_<float>({1, 4}, {2, 1, 2, 0}).copyTo(distance.row(0));
+  const cv::Mat confidence = (cv::Mat_<float>(2, 4) << 0.25, 0.5, 1, 0.75, 0, 0, 0, 0);
+  const auto curve = sparsification(distance, confidence, truth_, reference_, source_);
+  ASSERT_EQ(curve.size(), 10U);
+  // One of them at least, though a tenth is none.
+  const std::vector<std::size_t> counts = {1, 1, 1, 1, 2, 2, 2, 3, 3, 4};
+  const std::array bad = {0., 1 / 2., 2 / 3., 2 / 4.};
+  for (std::size_t i = 0; i < 10; ++i) {
+    const std::size_t kept = counts[i];
+    EXPECT_EQ(curve[i].kept, static_cast<double>(kept) / 4);
+    EXPECT_EQ(curve[i].confidence, 1.25 - 0.25 * static_cast<double>(kept));
+    EXPECT_EQ(curve[i].bad_pixels, bad[kept - 1]);
+  }
+  EXPECT_THAT(to_table(curve), ::testing::HasSubstr("          75%      0.500       66.67%\n"));
+}
+
+TEST_F(FourPixels, ReliabilityIsOfBinsThatBeginWithTheirLowerEnd) {
+  cv::Mat distance = truth_.distance.clone();
+  distance.at<float>(0, 1) = 1;  // wrong
+  const cv::Mat confidence = (cv::Mat_<float>(2, 4) << 0.5, 0.5, 1, 0, 0, 0, 0, 0);
+  const auto bins = reliability(distance, confidence, truth_, reference_, source_);
+  for (const ReliabilityBin& bin : bins) {
+    EXPECT_EQ(bin.pixels, bin.low == 0.5 ? 2 : bin.low == 0 || bin.high == 1 ? 1 : 0) << bin.low;
+  }
+  EXPECT_THAT(
+      to_table(bins),
+      ::testing::HasSubstr("0.50 to 0.70      50.0%      0.500     50.0% |     75.0%     66.7%\n"));
+}
+
 TEST(Evaluation, SparsificationFallsWhenConfidenceIsRight) {
   const RenderedPair pair = render_demo(96);
   const GroundTruth& truth = pair.views[0].truth;
@@ -417,6 +508,25 @@ TEST(Evaluation, ErrorPictureColours) {
   EXPECT_GT(picture.at<cv::Vec3b>(0, 1)[2], 200) << "wrong: red";
   EXPECT_GT(picture.at<cv::Vec3b>(0, 2)[0], 150) << "missing: blue";
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 3), cv::Vec3b(0, 0, 0));
+}
+
+TEST(Evaluation, ErrorPictureGoesFromGreenOverYellowToRed) {
+  GroundTruth truth;
+  truth.distance = cv::Mat(1, 5, CV_32FC1, cv::Scalar(1));
+  truth.valid = (cv::Mat_<uchar>(1, 5) << 255, 255, 255, 255, 0);
+  const cv::Mat distance = (cv::Mat_<float>(1, 5) << 1.0049f, 0.984f, 1.051f, 1, 1);
+  const cv::Mat picture = error_picture(distance, truth);
+  EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(0, 200, 0));
+  EXPECT_GT(picture.at<cv::Vec3b>(0, 1)[1], 190);
+  EXPECT_GT(picture.at<cv::Vec3b>(0, 1)[2], 240);
+  EXPECT_EQ(picture.at<cv::Vec3b>(0, 2), cv::Vec3b(0, 0, 255));
+  EXPECT_EQ(picture.at<cv::Vec3b>(0, 4), cv::Vec3b(0, 0, 0)) << "not valid";
+  truth.occlusion = (cv::Mat_<uchar>(1, 5) << 255, 0, 255, 128, 255);
+  const cv::Mat dimmed = error_picture(distance, truth);
+  for (int x : {0, 2}) EXPECT_EQ(dimmed.at<cv::Vec3b>(0, x), picture.at<cv::Vec3b>(0, x));
+  for (int x : {1, 3}) {
+    EXPECT_LT(dimmed.at<cv::Vec3b>(0, x)[1], 0.6 * picture.at<cv::Vec3b>(0, x)[1]);
+  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "error_of.h"
+#include "same_bits.h"
 #include "widestereo/synthesis.h"
 
 namespace widestereo::test {
@@ -57,12 +58,55 @@ TEST_F(ViewSynthesis, LeavesOutWhatHasNoDistanceOrIsMasked) {
   const SynthesisedView synthesised =
       synthesise_view(half, pair.rig.views[0], grey(pair.views[1]), pair.rig.views[1]);
   EXPECT_EQ(cv::countNonZero(synthesised.visible.colRange(0, 128)), 0);
+  EXPECT_DOUBLE_EQ(
+      scores_of(half, pair.rig).visible,
+      static_cast<double>(cv::countNonZero(synthesised.visible)) / cv::countNonZero(half > 0));
+  View masked = pair.rig.views[0];
+  masked.mask = half > 0;
+  const SynthesisedView unmasked =
+      synthesise_view(truth, masked, grey(pair.views[1]), pair.rig.views[1]);
+  EXPECT_TRUE(same_bits(unmasked.visible, synthesised.visible));
   Rig rig = pair.rig;
   rig.views[1].mask = cv::Mat(256, 256, CV_8UC1, cv::Scalar(0));
   EXPECT_EQ(scores_of(truth, rig).windows, 0);
   EXPECT_EQ(scores_of(truth, rig).visible, 0);
   const cv::Mat flat(256, 256, CV_8UC1, cv::Scalar(90));
   EXPECT_EQ(synthesis_scores(truth, flat, synthesised).windows, 0) << "nothing to compare";
+}
+
+/// Stripes two pixels wide and noise, whose correlation follows from their variances.
+TEST(SynthesisScores, AreOfTexturedWindowsThatAreMostlyVisible) {
+  constexpr int side = 66;
+  const cv::Mat distance(side, side, CV_32FC1, cv::Scalar(2));
+  const auto scores = [&](double contrast, double noise, int visible_of_20) {
+    cv::Mat image(side, side, CV_8UC1), visible(side, side, CV_8UC1);
+    cv::Mat synthesised(side, side, CV_32FC1);
+    cv::RNG random(7);
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        const double stripe = x / 2 % 2 == 0 ? contrast : -contrast;
+        image.at<uchar>(y, x) = cv::saturate_cast<uchar>(100 + stripe);
+        synthesised.at<float>(y, x) = static_cast<float>(50 + stripe + random.gaussian(noise));
+        visible.at<uchar>(y, x) = (7 * x + 3 * y) % 20 < visible_of_20 ? 255 : 0;
+      }
+    }
+    return synthesis_scores(distance, image, {.image = synthesised, .visible = visible});
+  };
+  const SynthesisScores exact = scores(20, 0, 20);
+  EXPECT_GT(exact.windows, 50 * 50);
+  EXPECT_NEAR(exact.mean, 1, 1e-6);
+  EXPECT_EQ(exact.above_0_9, 1);
+  const SynthesisScores noisy = scores(20, 13, 20);  // 1 / sqrt(1 + (13 / 20)^2) = 0.84
+  EXPECT_NEAR(noisy.mean, 0.84, 0.02);
+  EXPECT_LT(noisy.above_0_9, 0.05);
+  EXPECT_GT(noisy.above_0_8, 0.8);
+  EXPECT_GT(noisy.above_0_7, 0.99);
+  EXPECT_EQ(scores(2, 0, 20).windows, 0) << "of too little texture";
+  EXPECT_GT(scores(5, 0, 20).windows, 50 * 50);
+  const SynthesisScores mostly = scores(20, 0, 16);
+  EXPECT_NEAR(mostly.visible, 0.8, 0.01);
+  EXPECT_GT(mostly.windows, 0.7 * 50 * 50);
+  EXPECT_EQ(scores(20, 0, 11).windows, 0) << "of too little that is seen";
 }
 
 TEST_F(ViewSynthesis, NeedsMapsOfTheCalibratedSize) {

@@ -105,6 +105,7 @@ TEST(Maps, PngRoundsAndMarksWhatItCannotHold) {
   EXPECT_EQ(raw.at<ushort>(0, 0), 1235);  // 1234.5 rounds away from zero
   for (int i = 1; i < 6; ++i) EXPECT_EQ(raw.at<ushort>(0, i), 0) << i;
   EXPECT_FLOAT_EQ(read_map(folder / "d.png", 1000).at<float>(0, 0), 1.235f);
+  EXPECT_FLOAT_EQ(read_map(folder / "d.png", 500).at<float>(0, 0), 2.47f);
 }
 
 TEST(Maps, UnsupportedOnesAreRefused) {
@@ -153,6 +154,8 @@ TEST(Images, BecomeIntensities) {
   // ITU-R BT.601 luma of pure blue.
   EXPECT_NEAR(to_intensity(cv::Mat(1, 1, CV_8UC3, cv::Scalar(255, 0, 0)), "x").at<float>(0), 0.114,
               2e-3);
+  EXPECT_NEAR(to_intensity(cv::Mat(1, 1, CV_8UC4, cv::Scalar(255, 0, 0, 0)), "x").at<float>(0),
+              0.114, 2e-3);
   EXPECT_NEAR(to_intensity(cv::Mat(1, 1, CV_8UC4, cv::Scalar(255, 255, 255, 0)), "x").at<float>(0),
               1, 1e-6);
   EXPECT_THROW(to_intensity(cv::Mat(), "x"), Error);
@@ -202,6 +205,9 @@ TEST(Images, MasksAreAllThatIsAboveZero) {
   const cv::Mat of_labels = read_mask(folder / "labels.png");
   EXPECT_EQ(of_labels.at<std::uint8_t>(0, 0), 0);
   EXPECT_EQ(cv::countNonZero(of_labels), 3);
+  // How opaque a pixel is says nothing.
+  write_image(folder / "opaque.png", cv::Mat(2, 3, CV_8UC4, cv::Scalar(0, 0, 0, 255)));
+  EXPECT_EQ(cv::countNonZero(read_mask(folder / "opaque.png")), 0);
 }
 
 TEST(BadFiles, AreNamed) {
@@ -242,6 +248,13 @@ TEST(BadFiles, EveryTruncationIsNoticed) {
           << name << " " << size;
     }
   }
+}
+
+TEST(BadFiles, PfmMapsAreWholeToTheLastByte) {
+  const TemporaryFolder folder;
+  write_map(folder / "m.pfm", random_map(CV_32FC1));
+  const std::string whole = bytes_of(folder / "m.pfm");
+  EXPECT_THROW(read_map(folder.write("cut.pfm", whole.substr(0, whole.size() - 1))), Error);
 }
 
 TEST(BadFiles, PfmHeadersAreChecked) {

@@ -237,6 +237,13 @@ TEST_F(Trajectories, AreReadInTheirOrder) {
   EXPECT_LT((moved - Eigen::Vector3d(1, 3, 3)).norm(), 1e-6) << "a quarter turn about z";
 }
 
+TEST_F(Trajectories, RotationsStayRotationsHoweverFewDigitsTheyHave) {
+  folder_.write("poses.txt", "1.5 0 0 0 0 0 0.71 0.71\n");
+  const Eigen::Isometry3d pose = read_trajectory(folder_ / "poses.txt").poses[0].world_from_body;
+  EXPECT_NEAR((pose * Eigen::Vector3d(0, 0, 1)).norm(), 1, 1e-12);
+  EXPECT_NEAR((pose * Eigen::Vector3d(1, 0, 0)).norm(), 1, 1e-12);
+}
+
 TEST_F(Trajectories, MayBeginWithAByteOrderMark) {
   const std::string line = "2.5 1 2 3 0 0 0 1\n";
   for (const std::string& text : {line, "# timestamp tx ty tz qx qy qz qw\n" + line}) {
@@ -369,6 +376,8 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   const auto poses = poses_of_frames(frames, {0, 1}, trajectory, 0.01, "p");
   EXPECT_EQ(poses[0].translation().x(), 2);
   EXPECT_EQ(poses[1].translation().x(), 1);
+  frames[1].nanoseconds = 10'104'000'000;
+  EXPECT_EQ(poses_of_frames(frames, {1}, trajectory, 0.01, "p")[0].translation().x(), 1);
   frames[1].name = "late";
   frames[1].nanoseconds = 10'150'000'000;
   EXPECT_THAT(error_of([&] {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <utility>
 
@@ -32,11 +33,11 @@ class Fusion : public ::testing::Test {
     for (std::size_t i = 0; i < 3; ++i) {
       views_.push_back(scene.rig.views[i]);
       const RenderedView& rendered = scene.views[i];
-      maps_.push_back({.distance = rendered.truth.distance.clone(),
-                       .normals = rendered.truth.normals.clone(),
-                       .image = rendered.image,
-                       .confidence = cv::Mat(side, side, CV_32FC1,
-                                             cv::Scalar(0.5 + 0.1 * static_cast<double>(i)))});
+      maps_.push_back(
+          {.distance = rendered.truth.distance.clone(),
+           .normals = rendered.truth.normals.clone(),
+           .image = rendered.image,
+           .confidence = cv::Mat(side, side, CV_32FC1, cv::Scalar(std::array{0.6, 0.7, 0.5}[i]))});
     }
   }
   PointCloud fuse_all(const FusionOptions& options = {}) {
@@ -160,6 +161,28 @@ TEST_F(Fusion, ViewsThatAreNotComparedWithEachOtherShareTheirPoints) {
   // Views that make no point of their own hand points on.
   const std::vector<std::vector<std::size_t>> line = {{1}, {0}, {1}, {2}, {3}, {4}};
   EXPECT_EQ(fuse(same, line, maps).size(), one);
+}
+
+TEST_F(Fusion, PointsAreSharedAtEveryDistance) {
+  const std::vector<View> same(6, views_[0]);
+  const std::vector<std::vector<std::size_t>> chain = {{1}, {0}, {1}, {0}, {1}, {0}};
+  const cv::Mat has_distance = maps_[0].distance > 0;
+  const auto one = static_cast<std::size_t>(cv::countNonZero(has_distance));
+  for (double metres = 0.5; metres < 2; metres *= 1.04) {
+    maps_[0].distance.setTo(metres, has_distance);
+    ASSERT_EQ(fuse(same, chain, [this](std::size_t) { return maps_[0]; }).size(), one) << metres;
+  }
+}
+
+TEST_F(Fusion, AViewIsNoOtherOfItself) {
+  const auto with_itself = [this](int min_views) {
+    FusionOptions options;
+    options.min_views = min_views;
+    return fuse(
+        {views_[0]}, {{0}}, [this](std::size_t) { return maps_[0]; }, options);
+  };
+  EXPECT_FALSE(with_itself(1).empty());
+  EXPECT_TRUE(with_itself(2).empty());
 }
 
 /// A wall that each view is little nearer to than the one it is compared with.

@@ -42,9 +42,28 @@ TEST(AssumedPoints, LieInFrontOfTheViewsAllOverTheRange) {
     EXPECT_EQ(points[i].observers.front(), 0U);
     shared += points[i].observers == std::vector<std::size_t>{0, 2};
   }
+  for (std::size_t i = 64 * 4; i < 2 * 64 * 4; ++i) {  // of the second view, which looks back
+    EXPECT_LT(points[i].position.z(), 0);
+    EXPECT_EQ(points[i].observers, std::vector<std::size_t>{1});
+  }
   EXPECT_EQ(shared, 64 * 4U) << "neither behind the camera nor beyond the other image";
   // The middles of four equal steps of the logarithm.
   EXPECT_EQ(distances, (std::set<long>{1414, 2828, 5657, 11314}));
+}
+
+TEST(AssumedPoints, LieInImagesOfAnyShape) {
+  View view = view_at(0);
+  view.camera.width = 301;
+  view.camera.cx = 150;
+  double highest = 0, farthest_left = 0;
+  for (const ObservedPoint& point : assumed_points({view}, 1, 16)) {
+    EXPECT_EQ(point.observers.size(), 1U);
+    highest = std::min(highest, point.position.y() / point.position.z());
+    farthest_left = std::min(farthest_left, point.position.x() / point.position.z());
+  }
+  // The middles of the outermost of eight rows and columns.
+  EXPECT_NEAR(highest, -7 / 8.0, 1e-9);
+  EXPECT_NEAR(farthest_left, -7 / 8.0 * 301 / 101, 1e-9);
 }
 
 TEST(AssumedPoints, AreNotSeenThroughMasks) {
@@ -52,7 +71,9 @@ TEST(AssumedPoints, AreNotSeenThroughMasks) {
   views[1].mask = cv::Mat(101, 101, CV_8UC1, cv::Scalar(255));
   views[1].mask.colRange(0, 51) = 0;
   std::size_t shared = 0, of_second = 0;
-  for (const ObservedPoint& point : assumed_points(views, 1, 16)) {
+  const std::vector<ObservedPoint> points = assumed_points(views, 1, 16);
+  EXPECT_EQ(points.size(), (64 + 32) * 4U) << "masked pixels assume none";
+  for (const ObservedPoint& point : points) {
     if (point.observers.size() == 2) ++shared;
     if (point.observers.back() == 1) ++of_second;
     if (point.observers.back() == 1) {
@@ -129,6 +150,37 @@ TEST(ViewSelection, CountsObserversOnce) {
   const std::vector<ObservedPoint> points = {
       {{0, 0, 10}, {0, 1, 1, 1}}, {{0, 0, 10}, {2, 0}}, {{0, 0, 10}, {0, 2}}};
   EXPECT_EQ(ViewSelection(centres, points).sources(0, 2), (std::vector<std::size_t>{2, 1}));
+}
+
+/// So many points that two views share.
+struct Shared {
+  std::size_t first, second;
+  int points;
+};
+
+/// Of views at the corners of a square, which see them under angles of about the same worth.
+ViewSelection selection_of(const std::vector<Shared>& pairs) {
+  std::vector<ObservedPoint> points;
+  for (const Shared& pair : pairs) {
+    points.insert(points.end(), static_cast<std::size_t>(pair.points),
+                  {{0.5, 0.5, 10}, {pair.first, pair.second}});
+  }
+  return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, points};
+}
+
+TEST(ViewSelection, GroupsAreJoinedByWhatAllMembersShareWith) {
+  // View 2 has most in common with view 0, but little with view 1.
+  EXPECT_EQ(
+      selection_of({{0, 1, 20}, {0, 2, 18}, {0, 3, 10}, {1, 2, 2}, {1, 3, 10}}).groups(3).front(),
+      (std::vector<std::size_t>{0, 1, 3}));
+}
+
+TEST(ViewSelection, ViewsOfAGroupJoinAnotherOneWhereTheyShareTwiceAsMuch) {
+  const auto with = [](int shared) {
+    return selection_of({{0, 1, 100}, {2, 0, shared}, {2, 3, 20}}).groups(2);
+  };
+  EXPECT_EQ(with(30), (Groups{{0, 1}, {2, 3}}));
+  EXPECT_EQ(with(50), (Groups{{0, 1}, {2, 0}, {3, 2}}));
 }
 
 TEST(ViewSelection, NumbersOfNoViewAreErrors) {
