@@ -216,6 +216,13 @@ FN bool map_patch(CONTEXT_ARGUMENT PlaneWarp warp, CameraParameters camera, int 
   return has_x && has_y;
 }
 
+// How far what is curved lies from the affine map of the centre, on average over the samples of this radius: all matches
+// would be displaced by as much.
+FN vec2 mean_bend(PatchMap map, int radius) {
+  float mean_square = float(radius * (radius + 1)) * (1.0f / 3.0f);
+  return mean_square * (map.uxx + map.uyy);
+}
+
 // What a patch of the reference starts from in a source.
 struct PatchStart {
   PlaneWarp warp;
@@ -224,9 +231,10 @@ struct PatchStart {
   PatchMap map;    // into what sample_image() reads
 };
 
-// False where the source does not see the plane's front at the patch's centre, or too little around it.
+// False where the source does not see the plane's front at the patch's centre, or too little around it. `mapped`: with a
+// map, for samples of this radius.
 FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int model, int source,
-                    ivec2 pixel, vec3 m, bool mapped, OUT(PatchStart) start) {
+                    ivec2 pixel, vec3 m, bool mapped, int radius, OUT(PatchStart) start) {
   if (side_of_source(pair, m) <= 0.0f) return false;
   start.warp = warp_through(pair, m);
   vec2 centre;
@@ -236,6 +244,7 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
   if (!mapped) return patch_is_in_front(CONTEXT pixel, m);
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
+  if (WARP != WARP_QUADRATIC) start.map.u0 = start.map.u0 + mean_bend(start.map, radius);
   start.map.u0 = texel_at(CONTEXT start.map.u0);
   vec2 scale = texel_scale(CONTEXT_ONLY);
   start.map.ux = to_texels(scale, start.map.ux);
@@ -332,7 +341,9 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   PatchStart start;
-  if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, WARP != WARP_EXACT, start)) return INVALID_COST;
+  if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, WARP != WARP_EXACT, WINDOW_RADIUS, start)) {
+    return INVALID_COST;
+  }
 
   int last_row = PARAMETERS.cameras[reference].size.y - 1;
   CameraParameters camera_of_samples = camera;

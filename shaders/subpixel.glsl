@@ -15,7 +15,7 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
   CameraParameters camera = PARAMETERS.cameras[source];
   int model = model_of(CONTEXT camera);
   PatchStart start;
-  if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, start)) return 0.0f;
+  if (!begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, WINDOW_RADIUS, start)) return 0.0f;
   float inverse_scale = PARAMETERS.support.x;
   float n = 0.0f;
   float sum_a = 0.0f;

@@ -98,7 +98,8 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, fl
   float n = 0.0f;
   float sum = 0.0f;
   PatchStart start;
-  if (begin_patch(CONTEXT pair, camera, model_of(CONTEXT camera), source, pixel, m, true, start)) {
+  int model = model_of(CONTEXT camera);
+  if (begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, VOTE_MIDDLE_RADIUS, start)) {
     for (int dy = -VOTE_MIDDLE_RADIUS; dy <= VOTE_MIDDLE_RADIUS; ++dy) {
       int first = first_column(CONTEXT VOTE_MIDDLE_RADIUS, dy);
       RowMap row = map_row(CONTEXT start.map, float(first), float(dy));

@@ -19,6 +19,7 @@ constexpr int map_row_quadratic = 32;
 constexpr int map_offset_affine = 4;
 constexpr int map_offset_quadratic = 8;
 constexpr int map_axis = 15;
+constexpr int mean_bend = 7;  // and its sum with the centre
 constexpr int slopes_to_texels = 4;
 constexpr int bends_to_texels = 6;
 constexpr int map_corners = 9;
@@ -217,7 +218,7 @@ PatchOperations patch_operations(const KernelConstants& c) {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;
     operations.of_patch += anchors * warp_ray + 2 * map_axis + texel_at(c) +
-                           (is_scaled ? slopes_to_texels : 0) +
+                           (quadratic ? 0 : mean_bend) + (is_scaled ? slopes_to_texels : 0) +
                            rows * (quadratic ? map_row_quadratic : map_row_affine);
   }
   if (quadratic) operations.of_patch += map_corners + (is_scaled ? bends_to_texels : 0);

@@ -204,6 +204,59 @@ TEST(PatchWarps, AffineAndQuadraticStayCloseToTheExactMap) {
   }
 }
 
+TEST(PatchWarps, NoneDisplacesAPatch) {
+  for (const PatchWarp warp : {PatchWarp::affine, PatchWarp::quadratic}) {
+    for (const int radius : {1, 5}) {
+      Options options;
+      options.window_radius = 5;
+      options.warp = warp;
+      options.interpolation = Interpolation::linear;  // texels are pixels
+      KernelFixture fixture(fisheye_rig(512), options);
+      fixture.set_reference(0);
+      const auto context = fixture.context();
+      const kernel::ViewPair pair = context.parameters.pairs[1];
+      const kernel::CameraParameters camera = context.parameters.cameras[1];
+      std::mt19937 random(3);
+      std::uniform_int_distribution<int> coordinate(12, 499);
+      std::vector<double> displacements;
+      while (displacements.size() < 1000) {
+        const ivec2 pixel(coordinate(random), coordinate(random));
+        const cv::Vec4f ray = fixture.view(0).rays(pixel.y, pixel.x);
+        if (ray[3] == 0) continue;
+        const Eigen::Vector3f m =
+            random_plane(random, Eigen::Vector3f(ray[0], ray[1], ray[2]).cast<double>())
+                .cast<float>();
+        kernel::cpu::PatchStart start{};
+        if (!kernel::cpu::begin_patch(context, pair, camera, camera.size.z, 1, pixel,
+                                      vec3(m.x(), m.y(), m.z()), true, radius, start)) {
+          continue;
+        }
+        kernel::vec2 sum(0, 0);
+        int n = 0;
+        for (int dy = -radius; dy <= radius; ++dy) {
+          const kernel::cpu::RowMap row = kernel::cpu::map_row(
+              context, start.map, static_cast<float>(-radius), static_cast<float>(dy));
+          for (int dx = -radius; dx <= radius; ++dx) {
+            kernel::vec2 exact{};
+            if (!kernel::cpu::warp_pixel(context, start.warp, camera, camera.size.z,
+                                         ivec2(pixel.x + dx, pixel.y + dy), exact)) {
+              continue;
+            }
+            sum = sum + kernel::cpu::map_offset(context, row, static_cast<float>(dx + radius)) -
+                  exact;
+            ++n;
+          }
+        }
+        const int samples = (2 * radius + 1) * (2 * radius + 1);
+        if (n == samples) displacements.push_back(std::sqrt(dot(sum, sum)) / samples);
+      }
+      std::sort(displacements.begin(), displacements.end());
+      EXPECT_LT(displacements[500], 0.001) << radius;
+      EXPECT_LT(displacements[950], 0.005) << radius;
+    }
+  }
+}
+
 TEST(PatchCostRules, TexturelessPatchCarriesNoInformation) {
   Options options;
   options.window_radius = 3;
