@@ -9,13 +9,24 @@
 
 namespace ws = widestereo;
 
+namespace {
+
+void say_of(const ws::Rig& rig, std::size_t blurred, const char* why, double blur) {
+  std::fprintf(stderr,
+               "widestereo: %s %s than %s and is blurred by %.2f pixels before it is matched "
+               "(--blur 0 matches it as it is).\n",
+               rig.views[blurred].name.c_str(), why, rig.views[1 - blurred].name.c_str(), blur);
+}
+
+}  // namespace
+
 void SharpnessSettings::add_to(CLI::App& command) {
   command
       .add_option(
           "--blur", given_,
           "Blur images before they are matched: standard deviation, pixels, one for all "
           "views or one for each (by comma), 0 = do not; by default the sharper image of a pair, "
-          "where the two differ")
+          "or that of finer pixels, where the two differ")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 10.0));
 }
@@ -31,16 +42,19 @@ std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig,
   std::vector<double> blurs(count, given_.empty() ? 0 : given_.front());
   // Of more views each has sources that are as sharp as itself, or sharper ones that it needs.
   if (!given_.empty() || count != 2) return blurs;
+  for (std::size_t i = 0; i < 2; ++i) {
+    blurs[i] = ws::blur_of_finer_pixels(rig.views[i], rig.views[1 - i]);
+    if (blurs[i] > 0) {
+      say_of(rig, i, "has finer pixels", blurs[i]);
+      return blurs;
+    }
+  }
   const auto difference = ws::compare_sharpness(rig.views[0], rig.views[1], images[0], images[1],
                                                 ws::match_features(images[0], images[1]));
   if (!difference) return blurs;
   const auto sharper = static_cast<std::size_t>(difference->sharper);
   blurs[sharper] = difference->blur;
-  std::fprintf(stderr,
-               "widestereo: %s is sharper than %s and blurred by %.2f pixels before it is matched "
-               "(--blur 0 matches it as it is).\n",
-               rig.views[sharper].name.c_str(), rig.views[1 - sharper].name.c_str(),
-               difference->blur);
+  say_of(rig, sharper, "is sharper", difference->blur);
   return blurs;
 }
 

@@ -28,6 +28,12 @@ std::optional<SharpnessDifference> compare_sharpness(const View& first, const Vi
                                                      const cv::Mat& second_image,
                                                      const std::vector<PixelMatch>& matches);
 
+/// Standard deviation, pixels, of the Gaussian after which a view's image shows about as much
+/// detail as another camera with larger pixels does: by the median over the directions (at
+/// infinity) that both see. 0 where its pixels are not finer by a fifth, or nothing is seen by
+/// both. Throws Error for cameras that validate() refuses.
+double blur_of_finer_pixels(const View& view, const View& other);
+
 /// Blurred by a Gaussian of that standard deviation (pixels); as it is for 0.
 cv::Mat blurred(const cv::Mat& image, double blur);
 

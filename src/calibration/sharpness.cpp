@@ -25,6 +25,8 @@ constexpr std::size_t fewest_matches = 30;
 constexpr double largest_scale = 1.2;  // of a feature in one image to that in the other
 constexpr double smallest_blur = 0.7;  // noise in one image looks like less
 constexpr double largest_blur = 3;
+constexpr double blur_of_a_pixel = 0.5;  // pixels: of a square as a camera integrates over it
+constexpr int directions = 24;           // each way over an image
 constexpr double bisection_end = 0.01;
 constexpr double certain = 3;  // standard errors
 
@@ -157,6 +159,32 @@ std::optional<SharpnessDifference> compare_sharpness(const View& first, const Vi
   }
   if (difference.blur < smallest_blur) return std::nullopt;
   return difference;
+}
+
+double blur_of_finer_pixels(const View& view, const View& other) {
+  const MatchRays rays(view, other);
+  const Eigen::Matrix3d rotation = source_from_reference(other, view).linear();
+  std::vector<double> scales;  // pixels of the view for one of the other's
+  for (int y = 0; y < directions; ++y) {
+    for (int x = 0; x < directions; ++x) {
+      PixelMatch match;
+      match.first = {(x + 0.5) / directions * view.camera.width - 0.5,
+                     (y + 0.5) / directions * view.camera.height - 0.5};
+      Eigen::Vector3d ray;
+      Eigen::Vector3d ray_of_other;
+      if (!rays.first_camera().unproject(match.first, ray) ||
+          !rays.second_camera().project_into_image(rotation * ray, match.second) ||
+          !rays.find(match, ray, ray_of_other)) {
+        continue;
+      }
+      const auto angle = pixel_angle(rays.first_camera(), match.first);
+      const auto other_angle = pixel_angle(rays.second_camera(), match.second);
+      if (angle && other_angle) scales.push_back(*other_angle / *angle);
+    }
+  }
+  if (scales.empty()) return 0;
+  const double scale = percentile(scales, 0.5);
+  return scale < largest_scale ? 0 : blur_of_a_pixel * std::sqrt(scale * scale - 1);
 }
 
 cv::Mat blurred(const cv::Mat& image, double blur) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -149,6 +150,23 @@ TEST(Sharpness, DetailOfOneSizeCountsFromAnyDistance) {
   ASSERT_TRUE(found);
   EXPECT_EQ(found->sharper, 0);
   EXPECT_NEAR(found->blur, 1.5, 0.1);
+}
+
+TEST(FinerPixels, AreBlurredToTheOthers) {
+  const View coarse = view();
+  View fine = view(-0.1, 360);
+  EXPECT_EQ(blur_of_finer_pixels(coarse, view(-0.1)), 0);
+  EXPECT_EQ(blur_of_finer_pixels(coarse, fine), 0);
+  EXPECT_NEAR(blur_of_finer_pixels(fine, coarse), 0.5 * std::sqrt(2 * 2 - 1), 0.05);
+  EXPECT_EQ(blur_of_finer_pixels(view(-0.1, 200), coarse), 0) << "hardly finer";
+  // Of a wide image only what the other camera sees counts.
+  View wide = coarse;
+  wide.camera.model = CameraModel::kannala_brandt;
+  wide.camera.fx = wide.camera.fy = 80;
+  EXPECT_GT(blur_of_finer_pixels(coarse, wide), 0.5 * std::sqrt(2.25 * 2.25 - 1));
+  EXPECT_EQ(blur_of_finer_pixels(wide, coarse), 0);
+  fine.world_from_camera.rotate(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(blur_of_finer_pixels(fine, coarse), 0) << "they see nothing in common";
 }
 
 TEST(Sharpness, MaskedFeaturesDoNotCount) {

@@ -685,6 +685,28 @@ TEST_F(Command, OptionsMayStandBeforeImages) {
   EXPECT_TRUE(fs::exists(folder_ / "out/distance0.pfm"));
 }
 
+TEST_F(Command, ImageOfFinerPixelsIsBlurred) {
+  cv::Mat image = cv::imread(file("right.png"));
+  cv::resize(image, image, {192, 192});
+  cv::imwrite(file("fine.png"), image);
+  const std::string text = bytes_of("calib.yaml");
+  const std::size_t cam1 = text.find("cam1:");
+  const std::string of_fine =
+      replaced(text.substr(cam1), "28.9, 28.9, 47.9, 48.0", "57.8, 57.8, 96.3, 96.5");
+  folder_.write("fine.yaml", text.substr(0, cam1) + replaced(of_fine, "[96, 96]", "[192, 192]"));
+  const auto blur_of_second = [&] {
+    std::ifstream file(folder_ / "out/result.json");
+    return nlohmann::json::parse(file)["views"][1]["blur_pixels"].get<double>();
+  };
+  const std::string message = "cam1 has finer pixels than cam0 and is blurred by 0.87 pixels";
+  Outcome outcome = run(depth_of("left.png", "fine.png", "fine.yaml"));
+  EXPECT_NE(outcome.output.find(message), std::string::npos) << outcome.output;
+  EXPECT_NEAR(blur_of_second(), 0.5 * std::sqrt(3), 0.01);
+  outcome = run(depth_of("left.png", "fine.png", "fine.yaml") + "--blur 0");
+  EXPECT_EQ(outcome.output.find(message), std::string::npos) << outcome.output;
+  EXPECT_EQ(blur_of_second(), 0);
+}
+
 TEST_F(Command, SharperImageIsBlurred) {
   cv::Mat image = cv::imread(file("left.png"));
   cv::GaussianBlur(image, image, {}, 1);
