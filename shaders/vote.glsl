@@ -11,9 +11,8 @@
 #define RIVAL_DISPLACEMENT 0.35f
 // Largest difference of intensity that counts: all that differ by more are alike.
 #define LARGEST_DIFFERENCE 0.08f
-// Square of the difference that noise alone leaves, and its inverse.
-#define EXPECTED_DIFFERENCE2 1e-4f
-#define LARGEST_LIKENESS 1e4f
+// Mean squared difference, five grey levels squared, that halves the likeness.
+#define HALVING_DIFFERENCE2 4e-4f
 // Random slot; the search and the regression use lower ones.
 #define VOTE_SLOT 72
 // Pixels around whose intensities tell the gain: radius and step of their grid, and the rounds over them.
@@ -88,8 +87,8 @@ FN int checked_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, OUT(vec2)
   return telling_source(CONTEXT ray, w, velocity);
 }
 
-// Inverse of the mean squared difference of intensity over the middle of the patch, noise included, in units of the
-// darker image. It must not explain a wrong plane by a gain of its own, as a correlation of so few pixels could.
+// From 1 down by the mean squared difference of intensity over the middle of the patch, in units of the darker image. It
+// must not explain a wrong plane by a gain of its own, as a correlation of so few pixels could.
 FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, float gain) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
@@ -101,9 +100,9 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, fl
   int model = model_of(CONTEXT camera);
   if (begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, VOTE_MIDDLE_RADIUS, start)) {
     for (int dy = -VOTE_MIDDLE_RADIUS; dy <= VOTE_MIDDLE_RADIUS; ++dy) {
-      int first = first_column(CONTEXT VOTE_MIDDLE_RADIUS, dy);
+      int first = -VOTE_MIDDLE_RADIUS;
       RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
-      for (int dx = 0; dx <= VOTE_MIDDLE_RADIUS - first; dx += COLUMN_STEP) {
+      for (int dx = 0; dx <= VOTE_MIDDLE_RADIUS - first; ++dx) {
         float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + first + dx, pixel.y + dy));
         float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
         if (min(a, b) < 0.0f) continue;
@@ -114,8 +113,8 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, fl
     }
   }
   // What is not seen is as unlike as can be.
-  if (n == 0.0f) return 1.0f / (EXPECTED_DIFFERENCE2 + LARGEST_DIFFERENCE * LARGEST_DIFFERENCE);
-  return n / (EXPECTED_DIFFERENCE2 * n + sum);
+  if (n == 0.0f) return HALVING_DIFFERENCE2 / (HALVING_DIFFERENCE2 + LARGEST_DIFFERENCE * LARGEST_DIFFERENCE);
+  return HALVING_DIFFERENCE2 * n / (HALVING_DIFFERENCE2 * n + sum);
 }
 
 // Stores as prior (m, 1) the plane, of the pixel's own and its rivals, the candidates that the planes around support
@@ -204,9 +203,10 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int k = 0; k < count; ++k) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
-      // Most rivals have so few votes that no likeness makes up for them.
-      if (votes[k] * LARGEST_LIKENESS <= best) continue;
-      float score = votes[k] * likeness_of_middle(CONTEXT source, pixel, m, gain);
+      if (votes[k] <= best) continue;
+      float likeness = likeness_of_middle(CONTEXT source, pixel, m, gain);
+      // Of thin surfaces there are fewer pixels around than of what is behind them: what the images show must outweigh that.
+      float score = votes[k] * (likeness * likeness * likeness);
       if (score > best) {
         best = score;
         prior = vec4(m, 1.0f);

@@ -491,9 +491,9 @@ class Builder {
     pass.iteration = regressions_;
     pass.radius = options_.vote_radius;
     // Those of the pixel's own plane and of its rivals, in the source that tells most.
-    add_with_samples(Kernel::vote, pass, views_of(0),
-                     (1 + VOTE_RIVALS) *
-                         kernel::samples_of_patch(VOTE_MIDDLE_RADIUS, schedule_.constants.pattern));
+    add_with_samples(
+        Kernel::vote, pass, views_of(0),
+        (1 + VOTE_RIVALS) * kernel::samples_of_patch(VOTE_MIDDLE_RADIUS, PATTERN_DENSE));
     adopt_voted();
   }
 

@@ -65,7 +65,7 @@ TEST_P(ThinSurfaces, StayBeforeAWall) {
   }
   ASSERT_GT(pixels, 500);
   RecordProperty("lost", std::to_string(static_cast<double>(lost) / pixels));
-  EXPECT_LT(lost, 0.12 * pixels) << "of " << pixels;
+  EXPECT_LT(lost, 0.06 * pixels) << "of " << pixels;
 }
 
 }  // namespace

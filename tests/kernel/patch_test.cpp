@@ -248,7 +248,7 @@ TEST(PatchWarps, NoneDisplacesAPatch) {
           }
         }
         const int samples = (2 * radius + 1) * (2 * radius + 1);
-        if (n == samples) displacements.push_back(std::sqrt(dot(sum, sum)) / samples);
+        if (n == samples) displacements.push_back(static_cast<double>(length(sum)) / samples);
       }
       std::sort(displacements.begin(), displacements.end());
       EXPECT_LT(displacements[500], 0.001) << radius;

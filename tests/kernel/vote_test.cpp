@@ -107,7 +107,7 @@ TEST_F(Vote, WhatIsNotSeenIsAsUnlikeAsCanBe) {
     fixture_.view(0).image().setTo(reference);
     fixture_.view(1).image().setTo(source);
     fixture_.interpolate();
-    EXPECT_NEAR(likeness(far_plane, gain), 2000, 20) << "of differences in the darker image";
+    EXPECT_NEAR(likeness(far_plane, gain), 0.5, 0.005) << "of differences in the darker image";
   }
   fixture_.view(1).image().setTo(0);
   fixture_.interpolate();
