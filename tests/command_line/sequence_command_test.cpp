@@ -11,6 +11,9 @@
 #include <sstream>
 
 #include "command_fixture.h"
+#include "widestereo/calibration.h"
+#include "widestereo/image_io.h"
+#include "widestereo/synthesis.h"
 
 namespace widestereo::test {
 namespace {
@@ -407,6 +410,56 @@ class SequencePoses : public SequenceCommand {
            "--warm-iterations 1 --restart-below 0 --poses " + file(poses) + " ";
   }
 };
+
+/// Two frames of the demo's room, between which the rig moves and turns.
+class SequenceOfTheDemo : public Command {
+ protected:
+  void SetUp() override {
+    Command::SetUp();
+    for (int k = 0; k < 2; ++k) {
+      frames_.push_back(render_demo_from(world_from_rig(k), size));
+      for (int view = 0; view < 2; ++view) {
+        const fs::path folder = folder_ / ("data/cam" + std::to_string(view));
+        fs::create_directories(folder);
+        write_image(folder / ("00" + std::to_string(k) + ".png"), frames_[k].views[view].image);
+      }
+    }
+    write_kalibr(file("demo.yaml"), frames_[0].rig);
+  }
+  static Eigen::Isometry3d world_from_rig(int k) {
+    return Eigen::Translation3d(0.1 * k, 0.02 * k, 0.08 * k) *
+           Eigen::AngleAxisd(0.3 * k, Eigen::Vector3d::UnitY());
+  }
+  /// Share of the second frame's pixels that are wrong by more than a tenth, the first one having
+  /// started it by this motion of the rig.
+  double wrong_after(const Eigen::Isometry3d& first_from_second) const {
+    std::ostringstream poses;
+    const Eigen::Quaterniond q(first_from_second.linear());
+    poses << "0 0 0 0 0 0 0 1\n1 " << first_from_second.translation().transpose() << ' '
+          << q.coeffs().transpose() << "\n";
+    folder_.write("poses.txt", poses.str());
+    const Outcome outcome =
+        run("sequence " + file("data") + " -c " + file("demo.yaml") + " -o " + file("out") +
+            " --preset fast --device cpu --overwrite " +
+            "--min-distance 0.5 --max-distance 20 --restart-below 0 --poses " + file("poses.txt"));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_NE(outcome.output.find("warm, motion poses"), std::string::npos) << outcome.output;
+    const cv::Mat distance = cv::imread(file("out/001/distance0.tiff"), cv::IMREAD_UNCHANGED);
+    const GroundTruth& truth = frames_[1].views[0].truth;
+    const cv::Mat counted = (truth.distance > 0) & (truth.occlusion == 255);
+    const cv::Mat wrong = cv::abs(distance - truth.distance) > 0.1 * truth.distance;
+    return cv::countNonZero(wrong & counted) / double(cv::countNonZero(counted));
+  }
+
+  static constexpr int size = 160;
+  std::vector<RenderedPair> frames_;
+};
+
+TEST_F(SequenceOfTheDemo, KnownMotionLeadsFromTheFrameBefore) {
+  const double right = wrong_after(world_from_rig(1));
+  EXPECT_LT(right, 0.1);
+  EXPECT_GT(wrong_after(world_from_rig(1).inverse()), 2 * right) << "the way back";
+}
 
 TEST_F(SequencePoses, OfTheImuAreThoseOfTheCamera) {
   for (const std::string options : {"", "--views 1,0 "}) {
