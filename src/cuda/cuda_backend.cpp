@@ -133,7 +133,7 @@ void CudaBackend::check(cudaError_t result, const char* action) const {
 
 void CudaBackend::make_maps() {
   for (const cv::Size& size : sizes_) {
-    const std::size_t pixels = largest_area({size});
+    const std::size_t pixels = area(size);
     const std::string& name = target_.name;
     const cudaStream_t stream = stream_.get();
     ViewMaps& maps = maps_.emplace_back();

@@ -37,12 +37,9 @@ void ScheduleProgress::advance(long long samples) {
 }
 
 std::size_t largest_area(const std::vector<cv::Size>& sizes) {
-  std::size_t area = 0;
-  for (const cv::Size& size : sizes) {
-    area = std::max(area,
-                    static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height));
-  }
-  return area;
+  std::size_t largest = 0;
+  for (const cv::Size& size : sizes) largest = std::max(largest, area(size));
+  return largest;
 }
 
 void require_map(const cv::Mat& map, int view, cv::Size size, int type) {

@@ -35,7 +35,10 @@ class ScheduleProgress {
   long long done_ = 0;
 };
 
-/// Pixels of the largest view.
+inline std::size_t area(cv::Size size) {
+  return static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+}
+/// Of the largest view.
 std::size_t largest_area(const std::vector<cv::Size>& sizes);
 
 /// Size of the memory of an image of intensities (shaders/parameters.glsl).

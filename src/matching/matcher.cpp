@@ -48,19 +48,19 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& hypotheses, const cv::Mat_<cv:
   result.normals.create(hypotheses.size(), CV_32FC3);
   result.cost.create(hypotheses.size(), CV_32FC1);
   for_rows(hypotheses.rows, [&](int y) {
+    const cv::Vec4f* hypothesis = hypotheses[y];
     const cv::Vec4f* ray = rays[y];
     auto* held = result.hypotheses.ptr<cv::Vec4f>(y);
     float* distance = result.distance.ptr<float>(y);
     auto* normal = result.normals.ptr<cv::Vec3f>(y);
     float* cost = result.cost.ptr<float>(y);
     for (int x = 0; x < hypotheses.cols; ++x) {
-      held[x] = hypotheses(y, x);
-      cost[x] = held[x][3];
-      const kernel::vec4 hypothesis = to_vec4(held[x]);
-      distance[x] = kernel::plane_distance(hypothesis, to_vec4(ray[x]));
+      held[x] = hypothesis[x];
+      cost[x] = hypothesis[x][3];
+      distance[x] = kernel::plane_distance(to_vec4(hypothesis[x]), to_vec4(ray[x]));
       normal[x] = {0, 0, 0};
       if (distance[x] > 0) {
-        const kernel::vec3 n = kernel::plane_normal(hypothesis);
+        const kernel::vec3 n = kernel::plane_normal(to_vec4(hypothesis[x]));
         normal[x] = {n.x, n.y, n.z};
       }
     }

@@ -302,8 +302,7 @@ VkDeviceSize VulkanBackend::first_byte_of_map(int view) const {
 }
 
 VkDeviceSize VulkanBackend::map_bytes(int view) const {
-  const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
-  return static_cast<VkDeviceSize>(size.area()) * sizeof(cv::Vec4f);
+  return area(sizes_.at(static_cast<std::size_t>(view))) * sizeof(cv::Vec4f);
 }
 
 void VulkanBackend::upload(const MapBuffer& map, int view, const cv::Mat& values) {
