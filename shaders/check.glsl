@@ -7,18 +7,24 @@
 #define SUPPORT_STEP 8
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
-// Of the surroundings' mean squared correlation: from a twentieth on, their planes count as known from the images.
-#define EVIDENCE_SCALE 20.0f
+// Of the surroundings' mean squared correlation: below its inverse next to nothing matches.
+#define EVIDENCE_SCALE 32.0f
 // Where differences tell how intensity curves: on lines along both diagonals by turns, which reach this far and lie up to
 // so far beside the pixel, in steps of so many pixels both ways. All lie within an image's apron.
 #define CURVATURE_RADIUS 10
 #define CURVATURE_STEP 4
 #define CURVATURE_BESIDE 6
 // Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
-// standard deviation of 0.44 grey levels; its inverse.
-#define PER_CERTAIN_CURVATURE 3.3e5f
+// standard deviation of 0.8 grey levels; its inverse.
+#define PER_CERTAIN_CURVATURE 1e5f
 // Largest variance that is taken for noise, of two grey levels: more may be fine texture.
 #define LARGEST_NOISE 6e-5f
+// Variance that a match may leave unexplained besides noise, of 1.4 grey levels.
+#define UNEXPLAINED_VARIANCE 3e-5f
+// Displacement of the other view's own plane (px) that says half as much against a pixel's as any can.
+#define HALF_DOUBTED_DISPLACEMENT 0.25f
+// Displacement (px) from an end of the range of distances at which a plane is half as suspect of lying beyond.
+#define HALF_SUSPECT_DISPLACEMENT 2.0f
 
 // Variance of the reference patch over its usable pixels.
 FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -152,15 +158,46 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   return vec2(supporting * share, (EVIDENCE_SCALE * evidence) * share);
 }
 
-// Probability that the point lies within two source pixels of its true place: a logistic model of the
-// displacement from the source's own plane (px), the support of the surroundings, the cost and how far intensity curves,
-// fitted to ray-traced scenes (docs/accuracy.md). On blank walls with gradients of brightness, where everything matches,
-// planes agree because they are smooth; where next to nothing matches around, as in the dark beyond the lens circle,
-// because nothing contradicts them.
-FN float confidence_of(float displacement, float support, float cost, float evidence, float structure) {
-  float log_odds = -1.53f + 2.59f * structure - 0.32f * logarithm(1.0f + 16.0f * displacement) -
-                   0.79f * logarithm(1.02f - support) - 0.33f * logarithm(min(cost, 1.0f) + 0.02f);
-  return min(evidence, 1.0f) / (1.0f + exponential(-log_odds));
+// How much the match leaves unexplained, in units of what noise would: the cost by the patch's variance.
+FN float unexplained(float cost, float variance, float noise) {
+  return variance * cost * (2.0f - cost) / (noise + UNEXPLAINED_VARIANCE);
+}
+
+// How suspect a plane at inverse distance w is of being held at an end of the range of distances while the surface lies
+// beyond, 0 to 1. `speed`: source pixels per unit of inverse distance.
+FN float suspicion_at_ends(CONTEXT_ARGUMENT float w, float speed) {
+  float per_half = speed / HALF_SUSPECT_DISPLACEMENT;
+  float to_far = per_half * max(w - PARAMETERS.range.z, 0.0f);
+  float to_near = per_half * max(PARAMETERS.range.w - w, 0.0f);
+  // Nothing lies beyond where points move by little on their way from the farthest distance to infinity, or from the
+  // nearest to half of it.
+  float beyond_far = min(per_half * PARAMETERS.range.z, 1.0f);
+  float beyond_near = min(per_half * PARAMETERS.range.w, 1.0f);
+  return max(beyond_far / (1.0f + to_far * to_far), beyond_near / (1.0f + to_near * to_near));
+}
+
+// What tells how likely a pixel's point is where its plane puts it.
+struct Indications {
+  float displacement;  // from the source's own plane (px)
+  float support;       // of the surroundings
+  float evidence;      // EVIDENCE_SCALE times the surroundings' mean squared correlation
+  float structure;     // structure_of_surroundings()
+  float cost;          // 1 at most
+  float unexplained;
+  float suspicion;     // suspicion_at_ends()
+};
+
+// Probability that the point lies within two source pixels of its true place: a logistic model, fitted to ray-traced
+// scenes (docs/accuracy.md). Planes around that agree tell less where the match leaves more unexplained than noise, as
+// they do where the scene lies beyond the range of distances. Correlation of the surroundings counts where intensity
+// curves: on blank walls with gradients of brightness everything matches. Where next to nothing matches, as in the dark
+// beyond the lens circle, planes agree because nothing contradicts them.
+FN float confidence_of(Indications i) {
+  float doubt = i.displacement / (i.displacement + HALF_DOUBTED_DISPLACEMENT);
+  float log_odds = -0.75f + (4.15f / EVIDENCE_SCALE) * (i.evidence * i.structure) - 2.1f * doubt -
+                   1.34f * logarithm(1.02f - i.support) / sqrt(1.0f + i.unexplained) -
+                   4.58f * i.suspicion * sqrt(i.cost);
+  return min(i.evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
 // What a source shows of the point at inverse distance w, negative where it does not see it.
@@ -175,6 +212,7 @@ struct Comparison {
   vec3 ray;
   vec4 held;
   float w;          // its inverse distance
+  float speed;      // speed_in_sources()
   vec2 difference;  // relative, and displacement (px), from the nearest of the sources' own planes
   vec2 support;     // support_of_surroundings()
   int reasons;
@@ -189,6 +227,7 @@ FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
   c.w = dot(m, c.ray);
   c.difference = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
   c.support = vec2(0.0f, 0.0f);
+  c.speed = 0.0f;
   c.reasons = 0;
   if (!is_usable(CONTEXT pixel, usable_ray)) {
     c.reasons = REASON_NO_RAY;
@@ -198,17 +237,17 @@ FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
     c.reasons = REASON_NO_OVERLAP;
     return false;
   }
-  float speed = speed_in_sources(CONTEXT pixel, c.ray, c.w);
+  c.speed = speed_in_sources(CONTEXT pixel, c.ray, c.w);
   for (int i = 0; i < SOURCE_COUNT; ++i) {
     vec2 candidate = difference_from_source(CONTEXT source_at(CONTEXT i), pixel, c.ray, m);
     if (candidate.y < c.difference.y) c.difference = candidate;
   }
-  c.support = support_of_surroundings(CONTEXT pixel, c.ray, c.w, speed);
+  c.support = support_of_surroundings(CONTEXT pixel, c.ray, c.w, c.speed);
   vec4 limits = PARAMETERS.check_limits;
   float least_variance = PARAMETERS.patch_limits.x;
   if (least_variance > 0.0f && reference_variance(CONTEXT pixel) < least_variance) c.reasons |= REASON_NO_TEXTURE;
   if (c.held.w > limits.z) c.reasons |= REASON_HIGH_COST;
-  if (speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) c.reasons |= REASON_LOW_PARALLAX;
+  if (c.speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) c.reasons |= REASON_LOW_PARALLAX;
   if (c.w < PARAMETERS.patch_limits.z * length(m)) c.reasons |= REASON_TILT;
   if (c.difference.y >= UNKNOWN_DIFFERENCE) {
     c.reasons |= REASON_UNCHECKED;
@@ -225,9 +264,16 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   Comparison c;
   float confidence = 0.0f;
   if (compare_with_others(CONTEXT pixel, c)) {
-    float structure = structure_of_surroundings(CONTEXT pixel, reference_noise(CONTEXT pixel));
-    float displacement = c.difference.y >= UNKNOWN_DIFFERENCE ? UNCHECKED_DISPLACEMENT : c.difference.y;
-    confidence = confidence_of(displacement, c.support.x, c.held.w, c.support.y, structure);
+    float noise = reference_noise(CONTEXT pixel);
+    Indications i;
+    i.displacement = c.difference.y >= UNKNOWN_DIFFERENCE ? UNCHECKED_DISPLACEMENT : c.difference.y;
+    i.support = c.support.x;
+    i.evidence = c.support.y;
+    i.structure = structure_of_surroundings(CONTEXT pixel, noise);
+    i.cost = min(c.held.w, 1.0f);
+    i.unexplained = unexplained(i.cost, reference_variance(CONTEXT pixel), noise);
+    i.suspicion = suspicion_at_ends(CONTEXT c.w, c.speed);
+    confidence = confidence_of(i);
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(c.difference.x, c.difference.y, confidence, float(c.reasons)));
 }
