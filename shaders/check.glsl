@@ -7,8 +7,10 @@
 #define SUPPORT_STEP 8
 // Displacement (source pixels) up to which another plane supports the pixel's own.
 #define SUPPORT_DISPLACEMENT 1.0f
-// Of the surroundings' mean squared correlation: below its inverse next to nothing matches.
+// Inverse of the mean squared correlation of the surroundings below which next to nothing matches.
 #define EVIDENCE_SCALE 32.0f
+// Logarithm of odds per mean squared correlation of the surroundings where intensity curves.
+#define LARGEST_STRUCTURE 4.15f
 // Where differences tell how intensity curves: on lines along both diagonals by turns, which reach this far and lie up to
 // so far beside the pixel, in steps of so many pixels both ways. All lie within an image's apron.
 #define CURVATURE_RADIUS 10
@@ -19,8 +21,8 @@
 #define PER_CERTAIN_CURVATURE 1e5f
 // Largest variance that is taken for noise, of two grey levels: more may be fine texture.
 #define LARGEST_NOISE 6e-5f
-// Variance that a match may leave unexplained besides noise, of 1.4 grey levels.
-#define UNEXPLAINED_VARIANCE 3e-5f
+// Variance that any match may leave unexplained besides noise, of 1.4 grey levels.
+#define EXPECTED_VARIANCE 3e-5f
 // Displacement of the other view's own plane (px) that says half as much against a pixel's as any can.
 #define HALF_DOUBTED_DISPLACEMENT 0.25f
 // Displacement (px) from an end of the range of distances at which a plane is half as suspect of lying beyond.
@@ -88,8 +90,8 @@ FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
   return variance_of(curvature);
 }
 
-// How far intensity curves around the pixel by more than noise does, 0 to 1: where it is constant or a gradient, patches
-// match anywhere, and planes are those of what lies around, or of nothing.
+// How far intensity curves around the pixel by more than noise does, 0 to LARGEST_STRUCTURE: where it is constant or a
+// gradient, patches match anywhere, and planes are those of what lies around, or of nothing.
 FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
   Curvature curvature;
   begin_curvature(curvature);
@@ -103,7 +105,7 @@ FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
     way = -way;
   }
   float net = variance_of(curvature) - min(noise, LARGEST_NOISE);
-  return clamp(PER_CERTAIN_CURVATURE * net, 0.0f, 1.0f);
+  return clamp((LARGEST_STRUCTURE * PER_CERTAIN_CURVATURE) * net, 0.0f, LARGEST_STRUCTURE);
 }
 
 // Radians that the point's direction turns in the source per unit of inverse distance.
@@ -132,8 +134,8 @@ FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
   return beside.w != 0.0f && angle > 0.0f ? turn / angle : 0.0f;
 }
 
-// Of the surrounding planes: the share that puts the pixel's point where its own does (x) and EVIDENCE_SCALE times the
-// mean of their squared correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
+// Of the surrounding planes: the share that puts the pixel's point where its own does (x) and the mean of their squared
+// correlations, where positive (y). `speed`: source pixels per unit of inverse distance.
 FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
   float planes = 0.0f;
   float supporting = 0.0f;
@@ -154,13 +156,13 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
     }
   }
   float share = 1.0f / max(planes, 1.0f);
-  // Scaled first: of a product with a constant Mesa takes the first factor with it.
-  return vec2(supporting * share, (EVIDENCE_SCALE * evidence) * share);
+  return vec2(supporting * share, evidence * share);
 }
 
-// How much the match leaves unexplained, in units of what noise would: the cost by the patch's variance.
-FN float unexplained(float cost, float variance, float noise) {
-  return variance * cost * (2.0f - cost) / (noise + UNEXPLAINED_VARIANCE);
+// Of what the match leaves unexplained, the cost by the patch's variance, the share that noise explains: from 1 down.
+FN float share_of_noise(float cost, float variance, float noise) {
+  float expected = noise + EXPECTED_VARIANCE;
+  return expected / (expected + variance * (cost * (2.0f - cost)));
 }
 
 // How suspect a plane at inverse distance w is of being held at an end of the range of distances while the surface lies
@@ -180,10 +182,10 @@ FN float suspicion_at_ends(CONTEXT_ARGUMENT float w, float speed) {
 struct Indications {
   float displacement;  // from the source's own plane (px)
   float support;       // of the surroundings
-  float evidence;      // EVIDENCE_SCALE times the surroundings' mean squared correlation
+  float evidence;      // of the surroundings
   float structure;     // structure_of_surroundings()
   float cost;          // 1 at most
-  float unexplained;
+  float noise_share;   // share_of_noise()
   float suspicion;     // suspicion_at_ends()
 };
 
@@ -194,10 +196,11 @@ struct Indications {
 // beyond the lens circle, planes agree because nothing contradicts them.
 FN float confidence_of(Indications i) {
   float doubt = i.displacement / (i.displacement + HALF_DOUBTED_DISPLACEMENT);
-  float log_odds = -0.75f + (4.15f / EVIDENCE_SCALE) * (i.evidence * i.structure) - 2.1f * doubt -
-                   1.34f * logarithm(1.02f - i.support) / sqrt(1.0f + i.unexplained) -
-                   4.58f * i.suspicion * sqrt(i.cost);
-  return min(i.evidence, 1.0f) / (1.0f + exponential(-log_odds));
+  // Constants come first: of a product Mesa takes the first factor with them.
+  float log_odds = i.evidence * i.structure - 2.1f * doubt -
+                   1.34f * logarithm(1.02f - i.support) * sqrt(i.noise_share) -
+                   4.58f * i.suspicion * sqrt(i.cost) - 0.75f;
+  return min(EVIDENCE_SCALE * i.evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
 // What a source shows of the point at inverse distance w, negative where it does not see it.
@@ -271,9 +274,10 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     i.evidence = c.support.y;
     i.structure = structure_of_surroundings(CONTEXT pixel, noise);
     i.cost = min(c.held.w, 1.0f);
-    i.unexplained = unexplained(i.cost, reference_variance(CONTEXT pixel), noise);
+    i.noise_share = share_of_noise(i.cost, reference_variance(CONTEXT pixel), noise);
     i.suspicion = suspicion_at_ends(CONTEXT c.w, c.speed);
     confidence = confidence_of(i);
+    if (confidence < PARAMETERS.acceptance.x) c.reasons |= REASON_LOW_CONFIDENCE;
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(c.difference.x, c.difference.y, confidence, float(c.reasons)));
 }

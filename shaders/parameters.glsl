@@ -62,7 +62,8 @@ FN int samples_of_patch(int radius, int pattern) {
 #define REASON_TILT 128
 #define REASON_AMBIGUOUS 256
 #define REASON_SPECKLE 512
-#define REASON_FILLED 1024  // the last: FILL_WITH_MATCHES is the next bit
+#define REASON_FILLED 1024
+#define REASON_LOW_CONFIDENCE 2048  // the last: FILL_WITH_MATCHES is the next bit
 
 // Bits of PassParameters.neighbours.
 #define NEIGHBOUR_LEFT 1
@@ -89,7 +90,7 @@ FN int samples_of_patch(int radius, int pattern) {
 // and adopt_fill_pixel(), where it stands beside the reasons.
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
-#define FILL_WITH_MATCHES (2u * REASON_FILLED)
+#define FILL_WITH_MATCHES (2u * REASON_LOW_CONFIDENCE)
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
 // before it half the next one; those for normals alone, over an eighth, a half and the whole radius; the smallest
@@ -113,6 +114,7 @@ struct MatchParameters {
   vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; smallest
                       // support
   vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
+  vec4 acceptance;    // smallest confidence; unused
   ivec4 search;       // distance sampling, refinements, best sources; unused
   vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
                       // preference for far planes

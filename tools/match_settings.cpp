@@ -181,6 +181,8 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
             "Largest angle between normal and viewing ray, degrees");
   add_check("--min-support", &Options::min_support,
             "Share of the planes around that must support a pixel's own; fewer are a speckle");
+  add_check("--min-confidence", &Options::min_confidence,
+            "Smallest probability to lie within 2 px of the true place");
   add_check("--ambiguity-margin", &Options::ambiguity_margin,
             "Reject where another place costs less by more than this; 0 = not checked");
   add_check("--fill-radius", &Options::fill_radius,

@@ -28,6 +28,7 @@ enum Reason : std::uint16_t {
   reason_ambiguous = 256,    ///< another place in the source matches better
   reason_speckle = 512,      ///< hardly a plane around agrees
   reason_filled = 1024,      ///< not a reason: the rejected pixel took the plane of accepted ones
+  reason_low_confidence = 2048,  ///< confidence below Options::min_confidence
 };
 
 /// Result for one reference view. All maps have the view's size.

@@ -151,6 +151,9 @@ struct Options {
   /// Smallest share of the planes around (in 41x41 pixels) that put the pixel's point within a
   /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;
+  /// Smallest ViewResult::confidence accepted, 0..1: what is more likely wrong than right is
+  /// rejected.
+  double min_confidence = 0.5;
   /// Reject where a place 2, 4 or 8 source pixels away costs less by more than this, 0..2; 0 = not
   /// checked.
   double ambiguity_margin = 0;

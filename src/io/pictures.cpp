@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -14,6 +15,7 @@
 #include "io/bgr8.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
+#include "widestereo/matcher.h"
 
 namespace widestereo {
 namespace {
@@ -27,7 +29,7 @@ struct ReasonStyle {
   const char* name;
   cv::Vec3b colour;
 };
-const std::array<ReasonStyle, 11> reason_styles = {{{"no ray", {48, 48, 48}},
+const std::array<ReasonStyle, 12> reason_styles = {{{"no ray", {48, 48, 48}},
                                                     {"no overlap", {160, 90, 40}},
                                                     {"no texture", {200, 200, 60}},
                                                     {"high cost", {60, 60, 220}},
@@ -37,7 +39,8 @@ const std::array<ReasonStyle, 11> reason_styles = {{{"no ray", {48, 48, 48}},
                                                     {"tilt", {200, 150, 250}},
                                                     {"ambiguous", {60, 200, 250}},
                                                     {"speckle", {230, 80, 40}},
-                                                    {"filled", {150, 150, 150}}}};
+                                                    {"filled", {150, 150, 150}},
+                                                    {"low confidence", {110, 110, 160}}}};
 
 /// `share` in [0, 1] through a colour map; pixels where `valid` is 0 get the colour of no value.
 cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {
@@ -155,10 +158,11 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
   require_map(reasons, image.size(), CV_16UC1, "The map of reasons");
   cv::Mat picture = to_bgr8(image);
   // The lowest bit that is set shows, but what was filled shows as that.
-  for (std::size_t bit = reason_styles.size() - 1; bit-- > 0;) {
+  const auto show = [&](std::size_t bit) {
     picture.setTo(reason_styles[bit].colour, (reasons & (1 << bit)) != 0);
-  }
-  picture.setTo(reason_styles.back().colour, (reasons & (1 << (reason_styles.size() - 1))) != 0);
+  };
+  for (std::size_t bit = reason_styles.size(); bit-- > 0;) show(bit);
+  show(std::countr_zero(static_cast<unsigned>(reason_filled)));
   return picture;
 }
 

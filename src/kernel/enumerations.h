@@ -50,5 +50,6 @@ static_assert(REASON_TILT == reason_tilt);
 static_assert(REASON_AMBIGUOUS == reason_ambiguous);
 static_assert(REASON_SPECKLE == reason_speckle);
 static_assert(REASON_FILLED == reason_filled);
+static_assert(REASON_LOW_CONFIDENCE == reason_low_confidence);
 
 }  // namespace widestereo::kernel

@@ -123,6 +123,7 @@ void validate(const Options& o) {
   require_between(o.min_parallax, 0, 10000, "min parallax");
   require_between(o.max_tilt, 0, 90, "max tilt");
   require_between(o.min_support, 0, 1, "min support");
+  require_between(o.min_confidence, 0, 1, "min confidence");
   require_between(o.ambiguity_margin, 0, 2, "ambiguity margin");
   require_between(o.far_preference, 0, 1, "far preference");
   require_between(o.vote_radius, 0, 64, "vote radius");
@@ -178,6 +179,7 @@ std::string to_json(const Options& o) {
                                        {"min_parallax", o.min_parallax},
                                        {"max_tilt", o.max_tilt},
                                        {"min_support", o.min_support},
+                                       {"min_confidence", o.min_confidence},
                                        {"ambiguity_margin", o.ambiguity_margin},
                                        {"fill_radius", o.fill_radius}};
   return json.dump(2);

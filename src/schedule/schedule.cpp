@@ -23,8 +23,8 @@ constexpr int all_neighbours = left_and_up | right_and_down;
 // The blocks are uploaded as they are: their layout must be std140 (parameters) and std430 (pass).
 static_assert(sizeof(kernel::CameraParameters) == 96);
 static_assert(sizeof(kernel::ViewPair) == 48);
-static_assert(offsetof(kernel::MatchParameters, cameras) == 96);
-static_assert(offsetof(kernel::MatchParameters, pairs) == 96 + 96 * MAX_VIEWS);
+static_assert(offsetof(kernel::MatchParameters, cameras) == 112);
+static_assert(offsetof(kernel::MatchParameters, pairs) == 112 + 96 * MAX_VIEWS);
 static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
 static_assert(sizeof(kernel::PassParameters) == 68);
 
@@ -46,6 +46,7 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, int image
                     single(options.min_support)};
   p.check_limits = {single(options.consistency_relative), single(options.consistency_pixels),
                     single(options.max_cost), single(options.min_parallax)};
+  p.acceptance = {single(options.min_confidence), 0, 0, 0};
   const auto inverse_scale = [](double grey_levels) {
     return grey_levels > 0 ? static_cast<float>(255 / grey_levels) : 0.0f;
   };

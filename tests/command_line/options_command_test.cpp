@@ -53,6 +53,7 @@ const std::vector<GivenOption> options_of_fast = {
     {"--min-parallax", "0.375", "min_parallax", 0.375},
     {"--max-tilt", "80.5", "max_tilt", 80.5},
     {"--min-support", "0.2", "min_support", 0.2},
+    {"--min-confidence", "0.7", "min_confidence", 0.7},
     {"--ambiguity-margin", "0.15", "ambiguity_margin", 0.15},
     {"--fill-radius", "8", "fill_radius", 8}};
 

@@ -266,6 +266,29 @@ TEST(Checks, AgreementWithoutEvidenceIsNotConfident) {
   EXPECT_EQ(confidence_at_cost(1.3), 0) << "nor do contrary patches speak for a plane";
 }
 
+TEST(Checks, RejectWhatIsMoreLikelyWrongThanRight) {
+  Options options = wide_range();
+  const auto reasons_beside = [&](double least) {
+    options.min_confidence = least;
+    AgreeingViews views(options);
+    for (int view = 0; view < 2; ++view) {
+      const vec3 m = views.plane(view);
+      views.fixture.view(view).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.9));
+    }
+    views.fixture.view(0).hypotheses(48, 48)[3] = 0.4f;
+    const int reasons = views.reasons({48, 48});
+    return std::pair(reasons, views.fixture.view(0).checks(48, 48)[2]);
+  };
+  const float confidence = reasons_beside(0).second;
+  EXPECT_EQ(Options().min_confidence, 0.5);
+  EXPECT_LT(confidence, 0.5f);
+  EXPECT_EQ(reasons_beside(0.5).first, REASON_LOW_CONFIDENCE) << "and no other";
+  const auto limit = static_cast<double>(confidence);
+  EXPECT_EQ(reasons_beside(limit).first, 0);
+  EXPECT_EQ(reasons_beside(1.01 * limit).first, REASON_LOW_CONFIDENCE);
+  EXPECT_EQ(reasons_beside(0).first, 0);
+}
+
 TEST(Checks, AgreementOnGradientsOfBrightnessIsNotCertain) {
   AgreeingViews views(wide_range());
   cv::Mat image = views.fixture.view(0).image();

@@ -80,6 +80,7 @@ const std::vector<Range<double>> numbers = {
     {"min parallax", &Options::min_parallax, 0, 10000},
     {"max tilt", &Options::max_tilt, 0, 90},
     {"min support", &Options::min_support, 0, 1},
+    {"min confidence", &Options::min_confidence, 0, 1},
     {"ambiguity margin", &Options::ambiguity_margin, 0, 2},
     {"far preference", &Options::far_preference, 0, 1}};
 
