@@ -54,11 +54,11 @@ Options Options::preset_named(const std::string& name) {
   options.far_preference = 0.08;
   options.warm_iterations = 1;
   options.pattern = PatchPattern::checkerboard;
+  options.alternate_strips = true;
   if (name == "fast") {
     options.sweep_steps = 16;
     options.source_planes = false;
     options.coarse_planes = 2;
-    options.alternate_strips = true;
     options.regression_steps = 3;
     return options;
   }
@@ -66,7 +66,6 @@ Options Options::preset_named(const std::string& name) {
     options.sweep_steps = 128;
     options.regression_radius = 48;
     options.regression_steps = 8;
-    options.ambiguity_margin = 0.2;
     return options;
   }
   std::string known;
