@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "cuda/result.h"
+#include "text/mebibytes.h"
 
 namespace widestereo {
 
@@ -101,8 +102,7 @@ class PinnedMemory {
   PinnedMemory() = default;
   PinnedMemory(std::size_t bytes, const std::string& device) {
     void* memory = nullptr;
-    const std::string action =
-        "pin " + std::to_string((bytes >> 20) + 1) + " MiB of the host's memory for transfers";
+    const std::string action = "pin " + mebibytes(bytes) + " of the host's memory for transfers";
     check(cudaMallocHost(&memory, bytes), device, action);
     memory_.reset(memory);
   }
@@ -123,8 +123,7 @@ class DeviceArray {
               const std::string& purpose)
       : bytes_(count * sizeof(T)) {
     void* memory = nullptr;
-    const std::string action =
-        "allocate " + std::to_string((bytes_ >> 20) + 1) + " MiB for " + purpose;
+    const std::string action = "allocate " + mebibytes(bytes_) + " for " + purpose;
     check(cudaMalloc(&memory, bytes_), device, action);
     memory_.reset(static_cast<T*>(memory));
     check(cudaMemsetAsync(memory, 0, bytes_, stream), device, "clear " + purpose);

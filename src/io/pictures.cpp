@@ -223,7 +223,7 @@ cv::Mat with_reason_legend(const cv::Mat& picture) {
     const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
     const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
     cv::rectangle(result, box, cv::Scalar(reason_styles[i].colour), cv::FILLED);
-    put_text(result, reason_styles[i].name, {at.x + line, at.y + line * 2 / 3}, scale * 0.8);
+    put_text(result, reason_styles[i].name, {at.x + line, at.y + line * 2 / 3}, scale * 0.7);
   }
   return result;
 }

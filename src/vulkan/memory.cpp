@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "vulkan/memory.h"
 
+#include "text/mebibytes.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
-
-std::string mebibytes(VkDeviceSize bytes) {
-  return std::to_string((bytes + (1u << 20) - 1) >> 20) + " MiB";
-}
 
 Handle<VkDeviceMemory> allocate(const VulkanContext& context,
                                 const VkMemoryRequirements& requirements, std::uint32_t type,
