@@ -225,8 +225,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"reasons",
        "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
        "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle, 2048 low confidence, "
-       "and "
-       "1024 beside these where the pixel was filled; 0 = accepted; 16 bit"},
+       "and 1024 beside these where the pixel was filled; 0 = accepted; 16 bit"},
       {"cloud", "world frame, accepted pixels"},
       {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},

@@ -157,7 +157,9 @@ class ReconstructCommand : public ColmapCommand {
 };
 
 TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
-  const Outcome outcome = run(reconstruct());
+  // Three iterations leave little to be confident of.
+  const std::string however_unlikely = " --min-confidence 0 ";
+  const Outcome outcome = run(reconstruct() + however_unlikely);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("1 of 3 images see nothing that others see"), std::string::npos)
       << outcome.output;
@@ -168,7 +170,8 @@ TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
   const std::string pair = file("images/left.png") + " " + file("images/right/1.png");
   ASSERT_EQ(run("depth " + pair + " -c " + file("model") + " -o " + file("pair") +
                 " --preset paper --device cpu --iterations 2 --second-iterations 1"
-                " --window-radius 2")
+                " --window-radius 2" +
+                however_unlikely)
                 .exit_code,
             0);
   EXPECT_TRUE(same_bits(distance_in("out/left.png"), distance_in("pair")));
@@ -176,12 +179,12 @@ TEST_F(ReconstructCommand, MatchesEveryImageAndFusesTheirPoints) {
   EXPECT_TRUE(same_bits(distance_in("out/right/1.png"), second));
   const auto points = record()["cloud"]["points"].get<std::size_t>();
   const cv::Mat accepted = cv::imread(file("pair/distance_accepted0.tiff"), cv::IMREAD_UNCHANGED);
-  EXPECT_GT(points, 0.25 * cv::countNonZero(accepted));
+  EXPECT_GT(points, 0.3 * cv::countNonZero(accepted));
   EXPECT_NE(bytes_of("out/cloud.ply").find("element vertex " + std::to_string(points) + "\n"),
             std::string::npos);
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/cloud_preview.png"));
   // One view will do, but only accepted pixels.
-  ASSERT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
+  ASSERT_EQ(run(reconstruct() + however_unlikely + "--min-views 1").exit_code, 0);
   const cv::Mat of_second = cv::imread(file("pair/distance_accepted1.tiff"), cv::IMREAD_UNCHANGED);
   EXPECT_LE(record()["cloud"]["points"], cv::countNonZero(accepted) + cv::countNonZero(of_second));
 }
