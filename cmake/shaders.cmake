@@ -55,6 +55,8 @@ foreach(kernel IN LISTS kernels)
   widestereo_shader(${name} ${of_kernel})
   if(name STREQUAL "interpolate")
     widestereo_module(interpolate_half ${of_kernel} -DHALF_PRECISION)
+  elseif(name STREQUAL "iterate")
+    widestereo_module(iterate_tiled ${of_kernel} -DHAS_PATCH_TILE)
   endif()
 endforeach()
 # Of Vulkan alone: where an application's image is read or map is written.

@@ -7,7 +7,7 @@
 // instruction. Software devices, for which TEXEL_LOADS is defined, are a quarter faster without that machinery (lavapipe)
 // and have the four numbers of a sample in one texel, which takes them much less than four texels of one; so they read
 // maps and intensities as texel buffers, too. Where texture units filter, `interpolate` is compiled once more, for texels
-// of half precision (HALF_PRECISION).
+// of half precision (HALF_PRECISION), and `iterate` for workgroups that share what their patches do (HAS_PATCH_TILE).
 
 // Multiples of 8 in x keep the lanes of lavapipe busy, and let the threads that a GPU runs at once share a tile
 // (draw4_of_tile()); 128 invocations are legal everywhere.
@@ -95,6 +95,24 @@ float intensity_in_row(IntensityRow row, int dx) { return LOAD_INTENSITY(row + d
 
 // Views of a level follow each other, and sources are of the reference's level.
 int layer_of_texels(int view) { return view - pass.first_view; }
+
+#ifdef HAS_PATCH_TILE
+#define TILED true
+#define GROUP_WIDTH int(gl_WorkGroupSize.x)
+#define GROUP_HEIGHT int(gl_WorkGroupSize.y)
+#define GROUP_OF_LAUNCH ivec2(gl_WorkGroupID.xy)
+#define THREAD_OF_GROUP ivec2(gl_LocalInvocationID.xy)
+
+shared vec4 tile[PATCH_TILE_SAMPLES(GROUP_WIDTH, GROUP_HEIGHT, WINDOW_RADIUS)];
+
+#define TilePlace int
+
+TilePlace tile_place(int index) { return index; }
+
+vec4 tile_at(TilePlace place, int further) { return tile[place + further]; }
+
+void store_tile(TilePlace place, vec4 ray_and_intensity) { tile[place] = ray_and_intensity; }
+#endif
 
 ivec3 in_texels(int view, ivec2 p) { return ivec3(p + TEXEL_APRON, layer_of_texels(view)); }
 

@@ -110,7 +110,7 @@ FN bool project_in_domain(CameraParameters camera, int model, real3 point, OUT(r
   real y = real(0);
   if (is_fisheye(model)) {
     real rho = sqrt(rho2);
-    real theta = arc_tangent(rho, point.z);
+    real theta = polar_angle(rho, point.z);
     real distorted = fisheye_radius(camera, model, theta);
     inside = theta < camera.domain.y;
     bool off_axis = rho > real(0);
@@ -119,7 +119,7 @@ FN bool project_in_domain(CameraParameters camera, int model, real3 point, OUT(r
     y = point.y * scale;
   } else if (model == CAMERA_FIELD_OF_VIEW) {
     real rho = sqrt(rho2);
-    real distorted = arc_tangent(rho * camera.shape.y, point.z) / camera.shape.x;
+    real distorted = polar_angle(rho * camera.shape.y, point.z) / camera.shape.x;
     inside = rho > real(0) || point.z > real(0);
     real scale = rho > real(0) ? distorted / rho : camera.shape.y / (camera.shape.x * point.z);
     x = point.x * scale;
@@ -130,6 +130,7 @@ FN bool project_in_domain(CameraParameters camera, int model, real3 point, OUT(r
     x = arc_tangent(point.x, point.z);
     y = arc_tangent(point.y, sqrt(point.x * point.x + point.z * point.z));
   } else {
+    // Positive wherever a spherical model's point is inside.
     real denominator = point.z;
     if (model == CAMERA_DOUBLE_SPHERE) {
       real k = camera.shape.x * d + point.z;
@@ -143,8 +144,9 @@ FN bool project_in_domain(CameraParameters camera, int model, real3 point, OUT(r
       real e = sqrt(camera.shape.y * rho2 + point.z * point.z);
       inside = point.z > -camera.shape.z * e;
       denominator = camera.shape.x * e + (real(1) - camera.shape.x) * point.z;
+    } else {
+      inside = denominator > real(0);
     }
-    inside = inside && denominator > real(0);
     real scale = real(1) / denominator;
     x = point.x * scale;
     y = point.y * scale;

@@ -7,19 +7,24 @@
 #define QUARTER_TURN 1.57079633f
 #define HALF_TURN 3.14159265f
 
-// Angle of the point (x, y), as atan2; to 1e-7 rad.
-FN float arc_tangent(float y, float x) {
-  float larger = max(abs(x), abs(y));
-  float smaller = min(abs(x), abs(y));
-  if (!(larger > 0.0f)) return 0.0f;
+// Angle of the point (x, y), y >= 0, from the x axis, as atan2; to 1e-7 rad.
+FN float polar_angle(float y, float x) {
+  float larger = max(abs(x), y);
+  float smaller = min(abs(x), y);
   // tan(pi / 8): beyond it the angle is measured from pi / 4.
   bool beyond = smaller > 0.414213562f * larger;
-  float t = (beyond ? smaller - larger : smaller) * (1.0f / (beyond ? smaller + larger : larger));
+  // Of the zero vector it is 0.
+  float t = (beyond ? smaller - larger : smaller) * (1.0f / (beyond ? smaller + larger : max(larger, 1e-37f)));
   float z = t * t;
   float angle = t + t * z * (-0.333327567f + z * (0.199718792f + z * (-0.138244528f + z * 0.0790259548f)));
   if (beyond) angle = EIGHTH_TURN + angle;
-  if (abs(y) > abs(x)) angle = QUARTER_TURN - angle;
-  if (x < 0.0f) angle = HALF_TURN - angle;
+  if (y > abs(x)) angle = QUARTER_TURN - angle;
+  return x < 0.0f ? HALF_TURN - angle : angle;
+}
+
+// The same for any y.
+FN float arc_tangent(float y, float x) {
+  float angle = polar_angle(abs(y), x);
   return y < 0.0f ? -angle : angle;
 }
 

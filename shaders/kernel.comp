@@ -14,6 +14,10 @@
 #include "algorithm.glsl"
 
 void main() {
+#ifdef HAS_PATCH_TILE
+  fill_tile();
+  barrier();
+#endif
   ivec2 pixel;
   if (thread_pixel(VIEW, pixel)) KERNEL(pixel);
 }

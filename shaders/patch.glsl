@@ -10,6 +10,10 @@ FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
 }
 
+#ifdef HAS_PATCH_TILE
+#include "patch_tile.glsl"
+#endif
+
 // The first offset from x on a grid of this step that begins with `first` which lies in an image, whose first pixel is 0.
 FN int first_in_image(int x, int first, int step) {
   while (x + first < 0) first += step;
@@ -147,13 +151,21 @@ FN bool in_some_source(CONTEXT_ARGUMENT vec3 ray, vec3 m) {
   return false;
 }
 
-// Whether the plane is in front at the corners of the patch, and so everywhere in it.
+// A ray of the reference for the group's patches: of the tile, in the axes of the source, where there is one.
+FN vec4 ray_of_patch(CONTEXT_ARGUMENT ivec2 pixel) {
+#ifdef HAS_PATCH_TILE
+  if (TILED) return tile_at(CONTEXT place_of_pixel(CONTEXT pixel), 0);
+#endif
+  return ray_at(CONTEXT REFERENCE, pixel);
+}
+
+// Whether the plane is in front at the corners of the patch, and so everywhere in it. `m`: in the axes of those rays.
 FN bool patch_is_in_front(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   for (int i = 0; i < 4; ++i) {
     int x = pixel.x + ((i & 1) == 0 ? -WINDOW_RADIUS : WINDOW_RADIUS);
     int y = pixel.y + (i < 2 ? -WINDOW_RADIUS : WINDOW_RADIUS);
-    vec4 ray = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(x, y)));
+    vec4 ray = ray_of_patch(CONTEXT nearest_in_image(size, ivec2(x, y)));
     if (dot(m, vec3(ray.x, ray.y, ray.z)) < 0.0f) return false;
   }
   return true;
@@ -242,6 +254,10 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(CONTEXT centre));
   start.centre_a = intensity_at(CONTEXT REFERENCE, pixel);
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
+#ifdef HAS_PATCH_TILE
+  // As the tile's rays are.
+  if (TILED) m = rotate(pair, m);
+#endif
   if (!mapped) return patch_is_in_front(CONTEXT pixel, m);
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
   if (WARP != WARP_QUADRATIC) start.map.u0 = start.map.u0 + mean_bend(start.map, radius);
@@ -346,6 +362,11 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   }
 
   int last_row = PARAMETERS.cameras[reference].size.y - 1;
+#ifdef HAS_PATCH_TILE
+  vec3 m_turned = rotate(pair, m);
+  vec3 baseline = translation(pair);
+  PatchInTile in_tile = patch_in_tile(CONTEXT pixel);
+#endif
   CameraParameters camera_of_samples = camera;
   if (WARP == WARP_EXACT) camera_of_samples = camera_of_texels(CONTEXT camera, model);
   float inverse_scale = PARAMETERS.support.x;
@@ -369,11 +390,25 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       RowMap row;
       if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
       UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
-        float a = intensity_in_row(intensities_of_row, dx);
+        float a;
+        vec3 direction;
+#ifdef HAS_PATCH_TILE
+        if (TILED) {
+          vec4 of_tile = ray_and_intensity_in_tile(CONTEXT in_tile, dx, dy + WINDOW_RADIUS);
+          a = of_tile.w;
+          vec3 turned = vec3(of_tile.x, of_tile.y, of_tile.z);
+          direction = turned + dot(m_turned, turned) * baseline;
+        } else
+#endif
+        {
+          a = intensity_in_row(intensities_of_row, dx);
+          if (WARP == WARP_EXACT) {
+            vec4 ray = ray_in_row(rays_of_row, dx);
+            direction = warp_direction(start.warp, vec3(ray.x, ray.y, ray.z));
+          }
+        }
         vec2 texel;
         if (WARP == WARP_EXACT) {
-          vec4 ray = ray_in_row(rays_of_row, dx);
-          vec3 direction = warp_direction(start.warp, vec3(ray.x, ray.y, ray.z));
           float d;
           bool inside = project_in_domain(camera_of_samples, model, direction, d, texel);
           // The source is masked there, as it is outside its field of view. A condition would be kept in a register until

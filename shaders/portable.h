@@ -25,6 +25,11 @@
 //   ROWS_AT_ONCE                            of a patch: 1, or 2 where the pattern is a checkerboard, whose rows start in turn
 //                                           one column later, and a compiler is not asked to unroll so many (UNROLL_ROWS)
 //   SOURCE_COUNT                            of a view, and ONE_SOURCE, whether a compiler knows it to be 1
+//   TilePlace tile_place(index)             where the vector with this index lies in memory that a group of threads shares,
+//   vec4  tile_at(place, further)           and what lies so many vectors further; only with HAS_PATCH_TILE
+//   void  store_tile(place, vec4)           (patch_tile.glsl), as are
+//   TILED                                   whether this kernel has such a tile, GROUP_WIDTH and GROUP_HEIGHT of a group,
+//                                           GROUP_OF_LAUNCH and THREAD_OF_GROUP: which of them this thread is
 //   VIEW_OF_LAUNCH                          which of the views that one launch runs over this thread has, from 0.
 #ifndef WIDESTEREO_PORTABLE_H
 #define WIDESTEREO_PORTABLE_H
@@ -90,6 +95,10 @@
 #include "elementary.glsl"
 
 #endif
+
+// Pixels that patches reach whose centres are every other pixel of `height` rows, `width` of each: of a row, of all.
+#define PATCH_TILE_WIDTH(width, radius) (2 * ((width) + (radius)))
+#define PATCH_TILE_SAMPLES(width, height, radius) (PATCH_TILE_WIDTH(width, radius) * ((height) + 2 * (radius)))
 
 // This thread's views, of PASS.
 #define REFERENCE (PASS.reference + VIEW_OF_LAUNCH)

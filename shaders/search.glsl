@@ -113,21 +113,36 @@ FN bool is_new_plane(CONTEXT_ARGUMENT ivec2 neighbour) {
   return check_at(CONTEXT REFERENCE, neighbour).x >= float(since);
 }
 
+// Where the neighbour of bit i lies.
+FN ivec2 neighbour_of(ivec2 pixel, int i) {
+  int side = 1 << i;
+  int dx = side == NEIGHBOUR_LEFT ? -1 : (side == NEIGHBOUR_RIGHT ? 1 : 0);
+  int dy = side == NEIGHBOUR_UP ? -1 : (side == NEIGHBOUR_DOWN ? 1 : 0);
+  return ivec2(pixel.x + dx, pixel.y + dy);
+}
+
+// Bits of the neighbours whose planes are to be tried.
+FN uint new_neighbours(CONTEXT_ARGUMENT ivec2 pixel) {
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  uint wanted = 0u;
+  UNROLL for (int i = 0; i < 4; ++i) {
+    ivec2 q = neighbour_of(pixel, i);
+    // All are asked, so that a GPU does not wait for each of them in turn.
+    bool is_new = is_new_plane(CONTEXT nearest_in_image(size, q));
+    bool wants = (PASS.neighbours & (1 << i)) != 0 && in_image(size, q);
+    if (wants && is_new) wanted |= 1u << uint(i);
+  }
+  return wanted;
+}
+
 // Candidate i of a pixel: the planes of the four neighbours, then random perturbations of the held plane with
-// the range halved each time. Zero, which is never admissible, where there is none.
+// the range halved each time.
 FN vec3 candidate_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec4 held, int i) {
   if (i >= 4) {
     float scale = 1.0f / float(1 << (i - 4));
     return perturbed_plane(CONTEXT pixel, ray, vec3(held.x, held.y, held.z), scale, i);
   }
-  int side = 1 << i;
-  int dx = side == NEIGHBOUR_LEFT ? -1 : (side == NEIGHBOUR_RIGHT ? 1 : 0);
-  int dy = side == NEIGHBOUR_UP ? -1 : (side == NEIGHBOUR_DOWN ? 1 : 0);
-  ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-  if ((PASS.neighbours & side) == 0) return vec3(0.0f, 0.0f, 0.0f);
-  if (!in_image(PARAMETERS.cameras[REFERENCE].size, q)) return vec3(0.0f, 0.0f, 0.0f);
-  if (!is_new_plane(CONTEXT q)) return vec3(0.0f, 0.0f, 0.0f);
-  vec4 neighbour = hypothesis_at(CONTEXT REFERENCE, q);
+  vec4 neighbour = hypothesis_at(CONTEXT REFERENCE, neighbour_of(pixel, i));
   return vec3(neighbour.x, neighbour.y, neighbour.z);
 }
 
@@ -166,14 +181,14 @@ FN void iterate_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 held = before;
   // One loop for all candidates: the cost function is then compiled once. Threads that run at once wait for each other's
   // patches, so each goes on to its next candidate that takes one.
-  int candidates = 4 + PARAMETERS.search.y;
-  int next = 0;
-  while (next < candidates) {
+  // Bits of candidate_plane().
+  uint candidates = new_neighbours(CONTEXT pixel) | (((1u << uint(PARAMETERS.search.y)) - 1u) << 4u);
+  while (candidates != 0u) {
     vec3 m;
     do {
-      m = candidate_plane(CONTEXT pixel, ray, held, next);
-      ++next;
-    } while (next < candidates && !takes_a_patch(CONTEXT ray, held, m));
+      m = candidate_plane(CONTEXT pixel, ray, held, lowest_bit(candidates));
+      candidates &= candidates - 1u;
+    } while (candidates != 0u && !takes_a_patch(CONTEXT ray, held, m));
     held = better_of(CONTEXT pixel, ray, held, m, 0.0f);
   }
   bool taken = !is_same_plane(before, vec3(held.x, held.y, held.z));

@@ -63,6 +63,7 @@ FN float floor(float a) {
   return whole > a ? whole - 1.0f : whole;
 }
 #endif
+FN double polar_angle(double y, double x) { return ::atan2(y, x); }
 FN double arc_tangent(double y, double x) { return ::atan2(y, x); }
 FN float abs(float a) { return ::fabsf(a); }
 FN double abs(double a) { return ::fabs(a); }

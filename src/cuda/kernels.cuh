@@ -30,6 +30,13 @@ struct Constants {
   /// On the checkerboard rows start in turn one column later: two are the same for all turns.
   static constexpr int unrolled_rows =
       Pattern == static_cast<int>(PatchPattern::checkerboard) ? 2 : 1;
+  static constexpr bool tiled = false;
+};
+/// The same for a kernel whose blocks share rays and intensities of their patches
+/// (patch_tile.glsl).
+template <class C>
+struct Tiled : C {
+  static constexpr bool tiled = true;
 };
 using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 
@@ -44,6 +51,12 @@ using AnyConstants = Constants<-1, -1, -1, -1, -1, -1, -1, -1>;
 #define ONE_SOURCE (C::source_count == 1)
 #define VIEW_OF_LAUNCH static_cast<int>(blockIdx.z)
 #define HAS_DEVICE_FILTER
+#define HAS_PATCH_TILE
+#define TILED C::tiled
+#define GROUP_WIDTH block_width
+#define GROUP_HEIGHT block_height
+#define GROUP_OF_LAUNCH ivec2(static_cast<int>(blockIdx.x), static_cast<int>(blockIdx.y))
+#define THREAD_OF_GROUP ivec2(static_cast<int>(threadIdx.x), static_cast<int>(threadIdx.y))
 #define ROWS_AT_ONCE 1
 #undef PARAMETERS
 #define PARAMETERS (*context.parameters)
@@ -181,6 +194,25 @@ struct Algorithm {
     atomicMin(context.transfer_winner + transfer_index(CONTEXT p), index);
   }
 
+  /// Of the block (patch_tile.glsl).
+  FN float4* tile() {
+    __shared__ float4
+        samples[C::tiled ? PATCH_TILE_SAMPLES(block_width, block_height, C::window_radius) : 1];
+    return samples;
+  }
+  using TilePlace = float4*;
+  FN TilePlace tile_place(const Context&, int index) {
+    TilePlace place = tile() + index;
+#ifdef __CUDA_ARCH__
+    // Held in registers: the compiler would work it out anew for every row of a patch.
+    asm("" : "+l"(place));
+    __builtin_assume(__isShared(place));
+#endif
+    return place;
+  }
+  FN vec4 tile_at(const Context&, TilePlace place, int further) { return to_vec4(place[further]); }
+  FN void store_tile(const Context&, TilePlace place, vec4 v) { *place = to_float4(v); }
+
 #include "algorithm.glsl"
 
   /// This thread's place in its block, where consecutive threads fill tiles of such a size.
@@ -197,10 +229,10 @@ struct Algorithm {
   /// `warps_in_tiles`: those of draw4_of_tile().
   template <bool warps_in_tiles>
   FN bool thread_pixel(CONTEXT_ARGUMENT int view, ivec2& pixel) {
-    ivec2 place(static_cast<int>(threadIdx.x), static_cast<int>(threadIdx.y));
+    ivec2 place = THREAD_OF_GROUP;
     if constexpr (warps_in_tiles) {
       place = place_in_tiles<TILE_WIDTH, TILE_HEIGHT>();
-    } else if constexpr (reads_pairs) {
+    } else if constexpr (reads_pairs && !C::tiled) {
       // Texture units take four threads at a time, whose samples lie closer in squares.
       place = place_in_tiles<2, 2>();
     }
@@ -232,6 +264,10 @@ constexpr bool looks_around_by_tiles(std::string_view kernel) {
   template <class C>                                                                   \
   __global__ void __launch_bounds__(block_width* block_height, least_blocks<C>(#name)) \
       name(const __grid_constant__ Context context) {                                  \
+    if constexpr (C::tiled) {                                                          \
+      Algorithm<C>::fill_tile(context);                                                \
+      __syncthreads();                                                                 \
+    }                                                                                  \
     ivec2 pixel;                                                                       \
     if (Algorithm<C>::template thread_pixel<name##_in_tiles>(context, view, pixel)) {  \
       Algorithm<C>::name##_pixel(context, pixel);                                      \

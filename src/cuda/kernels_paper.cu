@@ -7,7 +7,10 @@ namespace {
 struct Get {
   template <class C>
   KernelTable operator()(C) const {
-    static const KernelEntry entries[] = {KERNEL_ENTRY(initialise, C), KERNEL_ENTRY(iterate, C),
+    // Each pixel tries dozens of planes there; else one.
+    using Iterate = std::conditional_t<C::warp == WARP_EXACT && C::source_count == 1, Tiled<C>, C>;
+    static const KernelEntry entries[] = {KERNEL_ENTRY(initialise, C),
+                                          KERNEL_ENTRY(iterate, Iterate),
                                           KERNEL_ENTRY(transfer_gather, C), KERNEL_ENTRY(check, C)};
     return table_of(entries);
   }

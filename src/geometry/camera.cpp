@@ -20,6 +20,7 @@ using real2 = Vector2<real>;
 using real3 = Vector3<real>;
 using real4 = Vector4<real>;
 using geometry::arc_tangent;
+using geometry::polar_angle;
 using geometry::sqrt;
 #include "camera.glsl"
 }  // namespace widestereo::kernel::dual

@@ -44,5 +44,6 @@ inline Dual arc_tangent(const Dual& y, const Dual& x) {
   const double square = y.value * y.value + x.value * x.value;
   return {std::atan2(y.value, x.value), (x.value * y.derivative - y.value * x.derivative) / square};
 }
+inline Dual polar_angle(const Dual& y, const Dual& x) { return arc_tangent(y, x); }
 
 }  // namespace widestereo::geometry

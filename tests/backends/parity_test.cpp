@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "backend_fixture.h"
 #include "device_fixture.h"
 #include "geometry/camera_parameters.h"
 #include "kernel/kernel_fixture.h"
@@ -128,6 +129,21 @@ TEST_P(Parity, InitialPlanesAndCostsAgree) {
     EXPECT_LT(percentile(0.99), 2e-4 * rounding);
   }
   expect_no_validation_messages(*device);
+}
+
+TEST_P(Parity, PlanesThatIterateTakesCostWhatPatchesCost) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  for (const CameraModel model :
+       {CameraModel::double_sphere, CameraModel::kannala_brandt, CameraModel::unified}) {
+    SCOPED_TRACE(to_string(model));
+    KernelFixture match = pair_to_iterate(model);
+    expect_costs_of_patches(device->implementation(), match);
+  }
+  expect_no_validation_messages(*device);
+  // In bands, whose first rows lie anywhere.
+  Device splitting = open_validated(GetParam(), 100000);
+  KernelFixture match = pair_to_iterate(CameraModel::double_sphere);
+  expect_costs_of_patches(splitting.implementation(), match);
 }
 
 TEST_P(Parity, WholeMatchAgrees) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "backend_fixture.h"
 #include "error_of.h"
 #include "kernel/kernel_fixture.h"
 #include "vulkan/instance.h"
@@ -52,16 +53,6 @@ inline KernelFixture small_match(const std::string& preset = "paper") {
   Rig rig = fisheye_rig(45);
   rig.views[1].camera = fisheye_camera(38);
   return KernelFixture(std::move(rig), options_of_small_match(preset));
-}
-
-inline void upload(Backend& backend, KernelFixture& match) {
-  const std::vector<View>& views = match.schedule().views;
-  for (int i = 0; i < static_cast<int>(views.size()); ++i) {
-    backend.set_rays(i, ray_image(views[i].camera, views[i].mask));
-    if (i < static_cast<int>(match.rig().views.size())) {
-      backend.set_intensity(i, match.view(i).image());
-    }
-  }
 }
 
 /// All maps of a match in one matrix of a single column, for comparing bits.
@@ -120,6 +111,7 @@ struct Faults {
   std::uint32_t largest_push_constants = 0;
   std::uint32_t largest_buffer = 0;  ///< bytes
   std::uint32_t storage_buffers = 0;
+  std::uint32_t largest_shared_memory = 0;  ///< bytes
   std::string missing_function = {};
   int growing_caches = 0;  ///< how often a pipeline cache grows while it is read
   int allocations = 0;

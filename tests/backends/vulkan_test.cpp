@@ -435,6 +435,21 @@ TEST(VulkanMatch, FiltersExactlyWhereTheDeviceCannotAndSaysSo) {
   EXPECT_GT(operations(without), operations(by_device));
 }
 
+TEST(VulkanMatch, WorkgroupsShareWhatTheirPatchesHaveInCommonOrNot) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  // Two halves of 13 columns and 26 rows; four bytes less.
+  constexpr std::uint32_t tile = 2 * 13 * 26 * 16;
+  for (const std::uint32_t memory : {tile, tile - 4}) {
+    SCOPED_TRACE(memory);
+    FaultyLoader::faults() = {.type = type_of_gpu, .largest_shared_memory = memory};
+    const auto device = open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr());
+    KernelFixture match = pair_to_iterate(CameraModel::kannala_brandt);
+    expect_costs_of_patches(*device, match);
+    EXPECT_THAT(device->validation_messages(), IsEmpty());
+  }
+}
+
 TEST(VulkanValidation, MissingLayerIsAnError) {
   REQUIRE_VULKAN_OR_SKIP();
   const FaultyLoader::Scope scope;
@@ -513,8 +528,10 @@ TEST_F(VulkanFailures, TheDeviceMayBeLostAtAnySubmission) {
 }
 
 TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
-  FaultyLoader::faults() = {.no_formats = true};
-  EXPECT_THAT(message_of_match(), HasSubstr("lacks storage images"));
+  FaultyLoader::faults() = {.no_formats = true, .type = type_of_software};
+  EXPECT_THAT(message_of_match(), HasSubstr("lacks storage images of four"));
+  FaultyLoader::faults() = {.no_formats = true, .type = type_of_gpu};
+  EXPECT_THAT(message_of_match(), HasSubstr("lacks sampled and storage images"));
   FaultyLoader::faults() = {.queue_families = {queue_family(VK_QUEUE_TRANSFER_BIT)}};
   EXPECT_THAT(message_of_match(), HasSubstr("no compute queue"));
   FaultyLoader::faults() = {.old_device = true};

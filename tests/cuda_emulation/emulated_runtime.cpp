@@ -20,6 +20,7 @@ using Clock = std::chrono::steady_clock;
 
 __thread dim3 blockIdx;
 __thread dim3 threadIdx;
+__thread bool stops_at_barrier;
 
 struct CUgraphNode_st {
   Work work;
@@ -168,16 +169,30 @@ cudaError_t bind_launch(const void* function, dim3 grid, dim3 block, void** argu
     };
     const unsigned all_rows = grid.y * grid.z;
     const unsigned threads = block.x * block.y;
+    // How many stopped at a barrier.
+    const auto run_threads = [&] {
+      unsigned stopped = 0;
+      for (unsigned i = 0; i < threads; ++i) {
+        const unsigned thread_of_block = place(i, threads);
+        threadIdx = dim3(thread_of_block % block.x, thread_of_block / block.x);
+        try {
+          thread();
+        } catch (const BlockBarrier&) {
+          ++stopped;
+        }
+      }
+      return stopped;
+    };
     cv::parallel_for_(cv::Range(0, static_cast<int>(all_rows)), [&](const cv::Range& rows) {
       for (int row = rows.start; row < rows.end; ++row) {
         const unsigned y = place(static_cast<unsigned>(row), all_rows);
         for (unsigned x = 0; x < grid.x; ++x) {
           blockIdx = dim3(place(x, grid.x), y % grid.y, y / grid.y);
-          for (unsigned i = 0; i < threads; ++i) {
-            const unsigned thread_of_block = place(i, threads);
-            threadIdx = dim3(thread_of_block % block.x, thread_of_block / block.x);
-            thread();
-          }
+          stops_at_barrier = true;
+          const unsigned stopped = run_threads();
+          stops_at_barrier = false;
+          CV_Assert(stopped == 0 || stopped == threads);
+          if (stopped > 0) run_threads();
         }
       }
     });

@@ -41,6 +41,7 @@ inline auto operator<=>(Number a, Number b) { return a.value <=> b.value; }
 inline bool operator==(Number a, Number b) { return a.value == b.value; }
 inline Number sqrt(Number a) { return counted(std::sqrt(a.value)); }
 inline Number arc_tangent(Number y, Number x) { return counted(std::atan2(y.value, x.value)); }
+inline Number polar_angle(Number y, Number x) { return arc_tangent(y, x); }
 inline Number abs(Number a) { return std::fabs(a.value); }
 inline Number floor(Number a) { return std::floor(a.value); }
 inline Number min(Number a, Number b) { return b < a ? b : a; }

@@ -11,10 +11,20 @@
 #define __global__
 #define __grid_constant__
 #define __launch_bounds__(threads, blocks)
+#define __shared__ static __thread
 
 // Not thread_local, whose wrapper for initialisation g++'s sanitizer takes for a null pointer.
 extern __thread dim3 blockIdx;
 extern __thread dim3 threadIdx;
+
+/// Threads of a block run one after the other: first up to its barrier, which they leave by
+/// throwing this, and then again to the end. What stands before a barrier must do the same a second
+/// time.
+struct BlockBarrier {};
+extern __thread bool stops_at_barrier;
+inline void __syncthreads() {
+  if (stops_at_barrier) throw BlockBarrier();
+}
 
 inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
 

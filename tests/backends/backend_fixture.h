@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// Parts of a match on a back end, run by themselves.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <vector>
+
+#include "kernel/kernel_fixture.h"
+#include "matching/backend.h"
+
+namespace widestereo::test {
+
+inline void upload(Backend& backend, KernelFixture& match) {
+  const std::vector<View>& views = match.schedule().views;
+  for (int i = 0; i < static_cast<int>(views.size()); ++i) {
+    backend.set_rays(i, ray_image(views[i].camera, views[i].mask));
+    if (i < static_cast<int>(match.rig().views.size())) {
+      backend.set_intensity(i, match.view(i).image());
+    }
+  }
+}
+
+/// A pair of the preset `paper`, whose sizes are no multiples of a group of threads, with a hole in
+/// the first view's mask.
+inline KernelFixture pair_to_iterate(CameraModel model) {
+  Rig rig = fisheye_rig(75);
+  rig.views[1].camera = fisheye_camera(61);
+  for (View& view : rig.views) {
+    view.camera.model = model;
+    if (model == CameraModel::kannala_brandt) view.camera.k1 = -0.01;
+    if (model == CameraModel::unified) view.camera.xi = 0.9;
+  }
+  rig.views[0].mask = cv::Mat(75, 75, CV_8U, cv::Scalar(255));
+  cv::circle(rig.views[0].mask, {40, 30}, 6, 0, cv::FILLED);
+  Options options = Options::preset_named("paper");
+  options.min_distance = 0.3;
+  options.max_distance = 10;
+  options.first_iterations = 1;
+  return KernelFixture(std::move(rig), options);
+}
+
+/// Runs the first iteration of the first view. The planes that it takes must cost what the CPU's
+/// patches cost, but for what texture units round.
+inline void expect_costs_of_patches(Device::Implementation& device, KernelFixture& match) {
+  Schedule schedule = match.schedule();
+  const auto is_later = [](const Dispatch& dispatch) {
+    return dispatch.kernel == Kernel::transfer_clear;
+  };
+  schedule.dispatches.erase(std::ranges::find_if(schedule.dispatches, is_later),
+                            schedule.dispatches.end());
+  ASSERT_EQ(schedule.dispatches.back().kernel, Kernel::iterate);
+  const auto backend = device.make_backend(sizes_of(schedule.views), schedule.constants);
+  upload(*backend, match);
+  backend->run(schedule, {});
+  const cv::Mat_<cv::Vec4f> planes = backend->hypotheses(0).clone();
+  const cv::Mat_<cv::Vec4f> checks = backend->checks(0).clone();
+
+  match.pass() = schedule.dispatches.back().pass;
+  std::vector<float> differences;
+  for (int y = 0; y < planes.rows; ++y) {
+    for (int x = 0; x < planes.cols; ++x) {
+      const cv::Vec4f& plane = planes(y, x);
+      // Where one was taken; its iteration stands there.
+      if (checks(y, x)[0] != 1 || match.view(0).rays(y, x)[3] == 0) continue;
+      const kernel::vec3 m(plane[0], plane[1], plane[2]);
+      const float cost = kernel::cpu::patch_cost(match.context(), {x, y}, m);
+      differences.push_back(std::abs(cost - plane[3]));
+    }
+  }
+  ASSERT_GT(differences.size(), 2000U);
+  std::ranges::sort(differences);
+  const auto percentile = [&](double share) {
+    return differences[static_cast<std::size_t>(share *
+                                                static_cast<double>(differences.size() - 1))];
+  };
+  EXPECT_LT(percentile(0.5), 2e-4);
+  EXPECT_LT(percentile(0.99), 4e-3);
+  // All but a few at whose rims a sample is seen or not.
+  EXPECT_LT(percentile(0.998), 0.05);
+}
+
+}  // namespace widestereo::test
