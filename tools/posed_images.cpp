@@ -123,8 +123,11 @@ PosedImages PosedImageSettings::of_model() const {
 
 PosedImages PosedImageSettings::of_trajectory() const {
   if (!poses.given() && frames.count != 1) {
-    // Of a model that lacks a file, reading says so.
-    if (fs::is_directory(rig.calibration)) ws::read_calibration(rig.calibration);
+    // Of a model that lacks a file or is damaged, reading says so.
+    const fs::path calibration = rig.calibration;
+    if (fs::is_directory(calibration) || calibration.extension() == ".json") {
+      ws::read_calibration(rig.calibration);
+    }
     throw ws::Error(rig.calibration +
                     " is no COLMAP model or transforms.json, so that the poses of the frames are "
                     "not known; give --poses, or take one frame (--count 1).");

@@ -216,6 +216,8 @@ Rig read_basalt(const Document& document) {
       rig.world_from_imu = first_from_imu;
     }
     return rig;
+  } catch (const Json::parse_error& error) {
+    document.fail(std::string("It is not valid JSON (") + error.what() + ").");
   } catch (const Json::exception& error) {
     document.fail(std::string("It is not valid JSON of a Basalt calibration (") + error.what() +
                   ").");

@@ -367,6 +367,14 @@ TEST_F(TransformsCommand, TakesATransformsFile) {
                "is a COLMAP model or transforms.json");
 }
 
+TEST_F(TransformsCommand, OneThatIsCutOffIsNamed) {
+  write_transforms("images/transforms.json", "left.png", "right/1.png");
+  const std::string whole = bytes_of("images/transforms.json");
+  folder_.write("images/transforms.json", whole.substr(0, whole.size() / 2));
+  expect_error(reconstruct_with("images/transforms.json") + range,
+               "transforms.json: It is not valid JSON (");
+}
+
 /// Results of such images lie in the output's folder, and nowhere else.
 TEST_F(TransformsCommand, ImagesMayLieOutsideOfTheFolder) {
   std::filesystem::create_directories(folder_ / "scene");
