@@ -142,6 +142,8 @@ TEST_F(MovingCamera, WithKnownPosesIsARig) {
   ASSERT_EQ(moved.exit_code, 0) << moved.output;
   ASSERT_FALSE(distance_in("out").empty());
   EXPECT_TRUE(same_bits(distance_in("moved"), distance_in("out")));
+  const nlohmann::json record = nlohmann::json::parse(bytes_of("moved/result.json"));
+  EXPECT_EQ(record["input"]["poses"], file("poses.txt"));
 
   // A quarter turn about z, far from the world's origin.
   const Outcome far =

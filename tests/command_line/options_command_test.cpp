@@ -242,5 +242,17 @@ TEST_F(EvaluateSets, AreFoundByTheirNames) {
                "has no depth0.tiff; give --truth");
 }
 
+TEST_F(EvaluateSets, FilesAreOfTheView) {
+  cv::Mat truth(96, 96, CV_32FC1, cv::Scalar(2.0));
+  truth.colRange(48, 96).setTo(0);  // nothing was hit
+  cv::imwrite(file("set/depth1.tiff"), truth);
+  cv::imwrite(file("set/fov0.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  cv::imwrite(file("set/fov1.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  const Outcome outcome = run("evaluate " + file("prediction.tiff") + " --json --far-distance 2" +
+                              " --view 1 --source 0 --set " + file("set"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_GT(nlohmann::json::parse(outcome.output)["far"]["pixels"], 1000);
+}
+
 }  // namespace
 }  // namespace widestereo::test
