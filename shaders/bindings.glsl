@@ -103,7 +103,8 @@ int layer_of_texels(int view) { return view - pass.first_view; }
 #define GROUP_OF_LAUNCH ivec2(gl_WorkGroupID.xy)
 #define THREAD_OF_GROUP ivec2(gl_LocalInvocationID.xy)
 
-shared vec4 tile[PATCH_TILE_SAMPLES(GROUP_WIDTH, GROUP_HEIGHT, WINDOW_RADIUS)];
+// No specialisation constants, by which not every driver sizes arrays.
+shared vec4 tile[LARGEST_PATCH_TILE];
 
 #define TilePlace int
 

@@ -99,6 +99,8 @@
 // Pixels that patches reach whose centres are every other pixel of `height` rows, `width` of each: of a row, of all.
 #define PATCH_TILE_WIDTH(width, radius) (2 * ((width) + (radius)))
 #define PATCH_TILE_SAMPLES(width, height, radius) (PATCH_TILE_WIDTH(width, radius) * ((height) + 2 * (radius)))
+// That of Vulkan's workgroups on GPUs and of 11x11 windows, in less memory than the 16 KiB that all devices have.
+#define LARGEST_PATCH_TILE PATCH_TILE_SAMPLES(8, 16, 5)
 
 // This thread's views, of PASS.
 #define REFERENCE (PASS.reference + VIEW_OF_LAUNCH)

@@ -97,25 +97,22 @@ Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& consta
   for (int i = 0; i < kernel_count; ++i) {
     const Kernel kernel = static_cast<Kernel>(i);
     if (kernel == Kernel::iterate_raster) continue;
-    pipelines_[static_cast<std::size_t>(i)] =
-        make(context, variant_of(context, kernel), layout(), cache);
+    pipelines_[static_cast<std::size_t>(i)] = make(context, variant_of(kernel), layout(), cache);
   }
 }
 
-std::string Pipelines::variant_of(const VulkanContext& context, Kernel kernel) const {
+std::string Pipelines::variant_of(Kernel kernel) const {
   const std::string name = to_string(kernel);
   if (kernel == Kernel::interpolate && half_precision_) return name + "_half";
-  if (kernel == Kernel::iterate && shares_patches(context)) return name + "_tiled";
+  if (kernel == Kernel::iterate && shares_patches()) return name + "_tiled";
   return name;
 }
 
-bool Pipelines::shares_patches(const VulkanContext& context) const {
+bool Pipelines::shares_patches() const {
   const KernelConstants& kernel = constants_.kernel;
   const auto radius = static_cast<std::uint32_t>(kernel.window_radius);
-  const std::uint32_t bytes = std::uint32_t{sizeof(kernel::vec4)} *
-                              PATCH_TILE_SAMPLES(constants_.width, constants_.height, radius);
   return filters() && kernel.warp == WARP_EXACT && kernel.source_count == 1 &&
-         bytes <= context.properties().limits.maxComputeSharedMemorySize;
+         PATCH_TILE_SAMPLES(constants_.width, constants_.height, radius) <= LARGEST_PATCH_TILE;
 }
 
 void Pipelines::make_layouts(const VulkanContext& context) {

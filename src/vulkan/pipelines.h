@@ -68,12 +68,11 @@ class Pipelines {
 
  private:
   void make_layouts(const VulkanContext& context);
-  /// The name among shader_code() of a kernel of the schedule, compiled for this device and these
-  /// constants.
-  std::string variant_of(const VulkanContext& context, Kernel kernel) const;
+  /// The name among shader_code() of a kernel of the schedule, as these constants want it.
+  std::string variant_of(Kernel kernel) const;
   /// Whether `iterate` keeps what patches have in common in memory of workgroups
   /// (shaders/patch_tile.glsl).
-  bool shares_patches(const VulkanContext& context) const;
+  bool shares_patches() const;
 
   /// What shaders are specialised for, by their numbers in shaders/bindings.glsl.
   struct Constants {

@@ -26,7 +26,7 @@ inline void upload(Backend& backend, KernelFixture& match) {
 
 /// A pair of the preset `paper`, whose sizes are no multiples of a group of threads, with a hole in
 /// the first view's mask.
-inline KernelFixture pair_to_iterate(CameraModel model) {
+inline KernelFixture pair_to_iterate(CameraModel model, int window_radius = 5) {
   Rig rig = fisheye_rig(75);
   rig.views[1].camera = fisheye_camera(61);
   for (View& view : rig.views) {
@@ -40,6 +40,7 @@ inline KernelFixture pair_to_iterate(CameraModel model) {
   options.min_distance = 0.3;
   options.max_distance = 10;
   options.first_iterations = 1;
+  options.window_radius = window_radius;
   return KernelFixture(std::move(rig), options);
 }
 

@@ -80,9 +80,6 @@ VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceP
     out->limits.maxStorageBufferRange = faults().largest_buffer;
     out->limits.maxTexelBufferElements = faults().largest_buffer / 16;
   }
-  if (faults().largest_shared_memory > 0) {
-    out->limits.maxComputeSharedMemorySize = faults().largest_shared_memory;
-  }
   if (faults().storage_buffers > 0) {
     out->limits.maxPerStageDescriptorStorageBuffers = faults().storage_buffers;
   }
