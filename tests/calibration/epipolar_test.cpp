@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "data_folder.h"
@@ -168,6 +169,28 @@ TEST(Epipolar, LeavesOutWhatIsMasked) {
     return std::round(match.second.x()) >= 256;
   });
   EXPECT_EQ(check_epipolar(rig.views[0], second, matches).matches, seen);
+}
+
+/// Of two things that look alike only one can be what the other view sees.
+TEST(Epipolar, AFeatureIsMatchedOnce) {
+  const auto pattern = [](int seed) {
+    cv::Mat noise(160, 160, CV_8UC1);
+    cv::RNG(seed).fill(noise, cv::RNG::UNIFORM, 0, 256);
+    cv::GaussianBlur(noise, noise, {}, 2);
+    return noise;
+  };
+  cv::Mat twice;
+  cv::hconcat(std::vector<cv::Mat>{pattern(1), pattern(2), pattern(1)}, twice);
+  cv::Mat once;
+  cv::hconcat(std::vector<cv::Mat>{pattern(1), pattern(2), pattern(3)}, once);
+  const std::vector<PixelMatch> matches = match_features(twice, once);
+  EXPECT_GT(matches.size(), 50U);
+  for (const PixelMatch& match : matches) {
+    const auto is_rival = [&](const PixelMatch& other) {
+      return other.second == match.second && (other.first - match.first).norm() > 10;
+    };
+    EXPECT_TRUE(std::none_of(matches.begin(), matches.end(), is_rival)) << match.first.transpose();
+  }
 }
 
 TEST(Epipolar, NeedsMatches) {
