@@ -367,6 +367,14 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   vec3 baseline = translation(pair);
   PatchInTile in_tile = patch_in_tile(CONTEXT pixel);
 #endif
+  float offset_a = start.centre_a;
+  float least_seen = 0.0f;  // of both; what is masked lies far below
+#ifdef HAS_PATCH_TILE
+  if (TILED) {
+    offset_a = WEIGHTED == 0 ? 0.0f : offset_a - TILE_GREY;
+    least_seen = -TILE_GREY;
+  }
+#endif
   CameraParameters camera_of_samples = camera;
   if (WARP == WARP_EXACT) camera_of_samples = camera_of_texels(CONTEXT camera, model);
   float inverse_scale = PARAMETERS.support.x;
@@ -418,8 +426,8 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
           texel = map_offset(CONTEXT row, float(dx));
         }
         float b = sample_image(CONTEXT source, camera.size, texel);
-        bool seen = min(a, b) >= 0.0f;
-        a -= start.centre_a;
+        bool seen = min(a, b) >= least_seen;
+        a -= offset_a;
         b -= start.centre_b;
         float weight = sample_weight(CONTEXT a, inverse_scale);
         float weighted_a = weight * a;

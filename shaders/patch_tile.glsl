@@ -4,6 +4,10 @@
 // one source: a plane then moves them along the baseline alone. For kernels of one colour: groups cover twice their
 // width.
 
+// What intensities are relative to, so that samples need not be made relative to their patch's centre: rounding of the
+// reference's own sums is much the same for all planes of a pixel.
+#define TILE_GREY 0.5f
+
 // Where the thread's group begins in the image.
 FN ivec2 first_pixel_of_group(CONTEXT_ARGUMENT_ONLY) {
   ivec2 group = GROUP_OF_LAUNCH;
@@ -37,7 +41,7 @@ FN void fill_tile(CONTEXT_ARGUMENT_ONLY) {
     if (in_image(size, pixel)) {
       vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
       ray_and_intensity =
-          vec4(rotate(pair, vec3(ray.x, ray.y, ray.z)), intensity_at(CONTEXT REFERENCE, pixel));
+          vec4(rotate(pair, vec3(ray.x, ray.y, ray.z)), intensity_at(CONTEXT REFERENCE, pixel) - TILE_GREY);
     }
     store_tile(CONTEXT place_in_tile(CONTEXT place), ray_and_intensity);
   }
@@ -57,7 +61,8 @@ FN PatchInTile patch_in_tile(CONTEXT_ARGUMENT ivec2 pixel) {
   return in_tile;
 }
 
-// The ray in the axes of the source and the intensity of a sample of the patch, counted from its first one.
+// The ray in the axes of the source and the intensity, relative to TILE_GREY, of a sample of the patch, counted from its
+// first one.
 FN vec4 ray_and_intensity_in_tile(CONTEXT_ARGUMENT PatchInTile in_tile, int column, int row) {
   int further = 2 * row * (GROUP_WIDTH + WINDOW_RADIUS) + column / 2;
   return (column & 1) == 0 ? tile_at(CONTEXT in_tile.even, further) : tile_at(CONTEXT in_tile.odd, further);

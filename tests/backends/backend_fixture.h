@@ -26,7 +26,8 @@ inline void upload(Backend& backend, KernelFixture& match) {
 
 /// A pair of the preset `paper`, whose sizes are no multiples of a group of threads, with a hole in
 /// the first view's mask.
-inline KernelFixture pair_to_iterate(CameraModel model, int window_radius = 5) {
+inline KernelFixture pair_to_iterate(CameraModel model, int window_radius = 5,
+                                     double weight_scale = 0) {
   Rig rig = fisheye_rig(75);
   rig.views[1].camera = fisheye_camera(61);
   for (View& view : rig.views) {
@@ -41,6 +42,7 @@ inline KernelFixture pair_to_iterate(CameraModel model, int window_radius = 5) {
   options.max_distance = 10;
   options.first_iterations = 1;
   options.window_radius = window_radius;
+  options.weight_scale = weight_scale;
   return KernelFixture(std::move(rig), options);
 }
 
@@ -72,7 +74,7 @@ inline void expect_costs_of_patches(Device::Implementation& device, KernelFixtur
       differences.push_back(std::abs(cost - plane[3]));
     }
   }
-  ASSERT_GT(differences.size(), 2000U);
+  ASSERT_GT(differences.size(), 500U);
   std::ranges::sort(differences);
   const auto percentile = [&](double share) {
     return differences[static_cast<std::size_t>(share *

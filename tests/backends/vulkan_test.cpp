@@ -440,9 +440,11 @@ TEST(VulkanMatch, WorkgroupsShareWhatTheirPatchesHaveInCommonOrNot) {
   const FaultyLoader::Scope scope;
   FaultyLoader::faults() = {.type = type_of_gpu};
   const auto device = open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr());
-  for (const int window_radius : {2, 5, 6}) {  // a small tile, the largest one, none
-    SCOPED_TRACE(window_radius);
-    KernelFixture match = pair_to_iterate(CameraModel::kannala_brandt, window_radius);
+  // A small tile, the largest one without and with weights, none.
+  for (const auto& [window_radius, weight_scale] :
+       {std::pair(2, 0.0), {5, 0.0}, {5, 0.1}, {6, 0.0}}) {
+    SCOPED_TRACE(testing::Message() << window_radius << ' ' << weight_scale);
+    KernelFixture match = pair_to_iterate(CameraModel::kannala_brandt, window_radius, weight_scale);
     expect_costs_of_patches(*device, match);
   }
   EXPECT_THAT(device->validation_messages(), IsEmpty());
