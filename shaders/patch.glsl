@@ -362,14 +362,12 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   }
 
   int last_row = PARAMETERS.cameras[reference].size.y - 1;
+  float offset_a = start.centre_a;
+  float least_seen = 0.0f;  // of both; what is masked lies far below
 #ifdef HAS_PATCH_TILE
   vec3 m_turned = rotate(pair, m);
   vec3 baseline = translation(pair);
   PatchInTile in_tile = patch_in_tile(CONTEXT pixel);
-#endif
-  float offset_a = start.centre_a;
-  float least_seen = 0.0f;  // of both; what is masked lies far below
-#ifdef HAS_PATCH_TILE
   if (TILED) {
     offset_a = WEIGHTED == 0 ? 0.0f : offset_a - TILE_GREY;
     least_seen = -TILE_GREY;

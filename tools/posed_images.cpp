@@ -126,7 +126,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
     // Of a model that lacks a file or is damaged, reading says so.
     const fs::path calibration = rig.calibration;
     if (fs::is_directory(calibration) || calibration.extension() == ".json") {
-      ws::read_calibration(rig.calibration);
+      ws::read_calibration(calibration);
     }
     throw ws::Error(rig.calibration +
                     " is no COLMAP model or transforms.json, so that the poses of the frames are "

@@ -7,7 +7,7 @@ namespace {
 struct Get {
   template <class C>
   KernelTable operator()(C) const {
-    // Each pixel tries dozens of planes there; else one.
+    // A pixel tries up to eight planes there, else one.
     using Iterate = std::conditional_t<C::warp == WARP_EXACT && C::source_count == 1, Tiled<C>, C>;
     static const KernelEntry entries[] = {KERNEL_ENTRY(initialise, C),
                                           KERNEL_ENTRY(iterate, Iterate),

@@ -4,13 +4,12 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <vector>
 
 #include "kernel/kernel_fixture.h"
 #include "matching/backend.h"
+#include "statistics/percentile.h"
 
 namespace widestereo::test {
 
@@ -50,11 +49,8 @@ inline KernelFixture pair_to_iterate(CameraModel model, int window_radius = 5,
 /// patches cost, but for what texture units round.
 inline void expect_costs_of_patches(Device::Implementation& device, KernelFixture& match) {
   Schedule schedule = match.schedule();
-  const auto is_later = [](const Dispatch& dispatch) {
-    return dispatch.kernel == Kernel::transfer_clear;
-  };
-  schedule.dispatches.erase(std::ranges::find_if(schedule.dispatches, is_later),
-                            schedule.dispatches.end());
+  keep_first(schedule, Kernel::transfer_clear);
+  schedule.dispatches.pop_back();
   ASSERT_EQ(schedule.dispatches.back().kernel, Kernel::iterate);
   const auto backend = device.make_backend(sizes_of(schedule.views), schedule.constants);
   upload(*backend, match);
@@ -75,15 +71,10 @@ inline void expect_costs_of_patches(Device::Implementation& device, KernelFixtur
     }
   }
   ASSERT_GT(differences.size(), 500U);
-  std::ranges::sort(differences);
-  const auto percentile = [&](double share) {
-    return differences[static_cast<std::size_t>(share *
-                                                static_cast<double>(differences.size() - 1))];
-  };
-  EXPECT_LT(percentile(0.5), 2e-4);
-  EXPECT_LT(percentile(0.99), 4e-3);
+  EXPECT_LT(percentile(differences, 0.5), 2e-4);
+  EXPECT_LT(percentile(differences, 0.99), 4e-3);
   // All but a few at whose rims a sample is seen or not.
-  EXPECT_LT(percentile(0.998), 0.05);
+  EXPECT_LT(percentile(differences, 0.998), 0.05);
 }
 
 }  // namespace widestereo::test
