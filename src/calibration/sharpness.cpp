@@ -162,6 +162,8 @@ std::optional<SharpnessDifference> compare_sharpness(const View& first, const Vi
 }
 
 double blur_of_finer_pixels(const View& view, const View& other) {
+  validate(view.camera, "The view's camera");
+  validate(other.camera, "The other view's camera");
   const MatchRays rays(view, other);
   const Eigen::Matrix3d rotation = source_from_reference(other, view).linear();
   std::vector<double> scales;  // pixels of the view for one of the other's

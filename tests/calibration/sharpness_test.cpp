@@ -169,6 +169,19 @@ TEST(FinerPixels, AreBlurredToTheOthers) {
   EXPECT_EQ(blur_of_finer_pixels(fine, coarse), 0) << "they see nothing in common";
 }
 
+TEST(FinerPixels, AreOfValidCameras) {
+  const auto error = [](const View& first, const View& second) {
+    return test::error_of([&] { blur_of_finer_pixels(first, second); });
+  };
+  EXPECT_EQ(error(view(), view()), "");
+  View wrong = view();
+  wrong.camera.fx = std::nan("");
+  EXPECT_EQ(error(wrong, view()).find("The view's camera: fx is nan"), 0U);
+  wrong = view();
+  wrong.camera.height = 0;
+  EXPECT_EQ(error(view(), wrong).find("The other view's camera: the image height is 0"), 0U);
+}
+
 TEST(Sharpness, MaskedFeaturesDoNotCount) {
   View masked = view();
   masked.mask = cv::Mat(size, size, CV_8UC1, cv::Scalar(255));
