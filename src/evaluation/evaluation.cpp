@@ -164,6 +164,14 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
   return samples;
 }
 
+/// Of a map of confidences that may not be missing.
+std::vector<Sample> collect_confident(const cv::Mat& distance, const cv::Mat& confidence,
+                                      const GroundTruth& truth, const View& reference,
+                                      const View& source) {
+  require_type(confidence, CV_32FC1, "The confidence map");
+  return collect(distance, {}, confidence, truth, reference, source);
+}
+
 /// Within right_pixels of its true place in the source; false where the predicted point does not
 /// project.
 bool is_right(const Sample& sample) { return sample.displacement <= right_pixels; }
@@ -374,7 +382,7 @@ ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& 
 std::vector<SparsificationPoint> sparsification(const cv::Mat& distance, const cv::Mat& confidence,
                                                 const GroundTruth& truth, const View& reference,
                                                 const View& source) {
-  std::vector<Sample> samples = collect(distance, {}, confidence, truth, reference, source);
+  std::vector<Sample> samples = collect_confident(distance, confidence, truth, reference, source);
   std::erase_if(samples, [](const Sample& s) { return !s.non_occluded || !s.in_source; });
   std::stable_sort(samples.begin(), samples.end(),
                    [](const Sample& a, const Sample& b) { return a.confidence > b.confidence; });
@@ -399,7 +407,7 @@ std::vector<ReliabilityBin> reliability(const cv::Mat& distance, const cv::Mat& 
   for (std::size_t i = 0; i + 1 < limits.size(); ++i) {
     bins.push_back({.low = limits[i], .high = limits[i + 1]});
   }
-  for (const Sample& sample : collect(distance, {}, confidence, truth, reference, source)) {
+  for (const Sample& sample : collect_confident(distance, confidence, truth, reference, source)) {
     if (!sample.predicted || !sample.in_source) continue;
     const auto above = std::upper_bound(limits.begin() + 1, limits.end() - 1, sample.confidence);
     ReliabilityBin& bin = bins[static_cast<std::size_t>(above - limits.begin() - 1)];

@@ -424,6 +424,20 @@ TEST_F(FourPixels, ConfidencesAreProbabilities) {
   }
 }
 
+TEST_F(FourPixels, ConfidencesAreNotInvented) {
+  const cv::Mat distance(2, 4, CV_32FC1, cv::Scalar(2));
+  const auto expect_error = [&](const cv::Mat& confidence, const char* message) {
+    const auto error = [&](auto score) {
+      return test::error_of([&] { score(distance, confidence, truth_, reference_, source_); });
+    };
+    EXPECT_THAT(error(sparsification), ::testing::HasSubstr(message));
+    EXPECT_THAT(error(reliability), ::testing::HasSubstr(message));
+  };
+  expect_error({}, "The confidence map is empty");
+  expect_error(cv::Mat::ones(2, 4, CV_64FC1), "The confidence map is CV_64FC1");
+  expect_error(cv::Mat::ones(2, 3, CV_32FC1), "The confidence map is 3x2");
+}
+
 TEST_F(FourPixels, SparsificationKeepsTheSurestPixels) {
   cv::Mat distance = truth_.distance.clone();
   cv::Mat_<float>({1, 4}, {2, 1, 2, 0}).copyTo(distance.row(0));
