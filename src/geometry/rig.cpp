@@ -15,9 +15,11 @@ View resized(const View& view, int width, int height) {
   result.camera = resized(view.camera, width, height);
   const cv::Size size(width, height);
   if (view.mask.empty() || view.mask.size() == size) return result;
-  cv::Mat kept;
-  cv::resize(view.mask != 0, kept, size, 0, 0, cv::INTER_AREA);
-  result.mask = kept == 255;
+  // In floats, where the share of one excluded pixel among however many is not rounded off.
+  cv::Mat excluded;
+  cv::Mat(view.mask == 0).convertTo(excluded, CV_32F);
+  cv::resize(excluded, excluded, size, 0, 0, cv::INTER_AREA);
+  result.mask = excluded == 0;
   return result;
 }
 

@@ -82,6 +82,19 @@ TEST(ResizedViews, ExcludePixelsThatCoverExcludedOnes) {
   EXPECT_THROW(resized(view, 32, 24), Error);
 }
 
+TEST(ResizedViews, ExcludePixelsHoweverManyTheyCover) {
+  View view = two_views().views[1];
+  view.camera.width = view.camera.height = 4096;
+  view.mask = cv::Mat(4096, 4096, CV_8UC1, cv::Scalar(255));
+  view.mask.at<uchar>(2016, 1017) = 0;
+  for (const int side : {2048, 128, 2}) {
+    const cv::Mat mask = resized(view, side, side).mask;
+    EXPECT_EQ(cv::countNonZero(mask == 0), 1) << side;
+    EXPECT_EQ(mask.at<uchar>(2016 * side / 4096, 1017 * side / 4096), 0) << side;
+    EXPECT_EQ(mask.at<uchar>(side - 1, side - 1), 255) << side;
+  }
+}
+
 TEST(Maps, HaveTheCalibratedSize) {
   const View view = two_views().views[1];  // of 64x48 pixels
   const auto error = [&view](int width, int height) {
