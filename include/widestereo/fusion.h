@@ -33,14 +33,15 @@ using MapsOfView = std::function<ViewMaps(std::size_t view)>;
 
 /// One cloud from the maps of many views, in the frame of their poses, whose origin must not be
 /// far: positions are single precision (local_origin()). View after view, each pixel that is not
-/// part of a point yet is joined by those pixels of the view's `others` (indices, best first; one
-/// list for each view, of which as many are used as fit in half of the cache, ten at least) that
-/// its point projects to and that agree. Where one of them is part of a point already, seen about
-/// as finely, that point stands for the new pixel, too, and for what later agrees with it. Else the
-/// point is their mean, weighted by the inverse square of the distance that each was seen from; its
-/// confidence that of the surest. A point that more views see through, to a farther surface, than
-/// have it is left out, unless min_views is 1. The same input gives the same cloud. `progress` is
-/// told the share done. Throws Error when maps do not fit their view, and what `maps` throws.
+/// part of a point yet is joined by those pixels of the view's `others` (indices, best first, the
+/// view itself and repeats ignored; one list for each view, of which as many are used as fit in
+/// half of the cache, ten at least) that its point projects to and that agree. Where one of them is
+/// part of a point already, seen about as finely, that point stands for the new pixel, too, and for
+/// what later agrees with it. Else the point is their mean, weighted by the inverse square of the
+/// distance that each was seen from; its confidence that of the surest. A point that more views see
+/// through, to a farther surface, than have it is left out, unless min_views is 1. The same input
+/// gives the same cloud. `progress` is told the share done. Throws Error when maps do not fit their
+/// view, and what `maps` throws.
 PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
                 const MapsOfView& maps, const FusionOptions& options = {},
                 const std::function<void(double)>& progress = {});

@@ -182,6 +182,20 @@ struct Neighbour {
   CloudCache::Cloud cloud;
 };
 
+/// The list without the view itself and without repeats, which would count as further views.
+std::vector<std::size_t> distinct_others(const std::vector<std::size_t>& others, std::size_t view,
+                                         std::size_t views) {
+  std::vector<bool> is_known(views);
+  is_known[view] = true;
+  std::vector<std::size_t> distinct;
+  for (const std::size_t other : others) {
+    if (!is_known[other]) distinct.push_back(other);
+    is_known[other] = true;
+  }
+  return distinct;
+}
+
+/// `others`: as distinct_others() gives them.
 class Fusion {
  public:
   Fusion(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
@@ -196,7 +210,6 @@ class Fusion {
       // Clouds hold more than the index, and fewer are looked at then.
       std::size_t looked_at = 0, bytes = index_bytes(i);
       for (const std::size_t other : others[i]) {
-        if (other == i) continue;
         if (!is_looked_at(looked_at++, bytes)) break;
         bytes += index_bytes(other);
         last_use_[other] = i;
@@ -209,7 +222,6 @@ class Fusion {
     std::vector<Neighbour> neighbours;
     std::size_t bytes = self.cloud->bytes();
     for (const std::size_t other : others) {
-      if (other == number) continue;
       if (!is_looked_at(neighbours.size(), bytes)) break;
       neighbours.push_back(neighbour(other));
       bytes += neighbours.back().cloud->bytes();
@@ -370,9 +382,13 @@ PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<st
     }
   }
   if (views.empty()) return {};
-  Fusion fusion(views, others, maps, options);
+  std::vector<std::vector<std::size_t>> distinct;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    fusion.add(i, others[i]);
+    distinct.push_back(distinct_others(others[i], i, views.size()));
+  }
+  Fusion fusion(views, distinct, maps, options);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    fusion.add(i, distinct[i]);
     if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(views.size()));
   }
   return fusion.take();

@@ -185,6 +185,23 @@ TEST_F(Fusion, AViewIsNoOtherOfItself) {
   EXPECT_TRUE(with_itself(2).empty());
 }
 
+TEST_F(Fusion, AViewListedTwiceIsOneView) {
+  const auto fused = [this](std::vector<std::size_t> of_first, int min_views) {
+    FusionOptions options;
+    options.min_views = min_views;
+    return fuse(
+        {views_[0], views_[1]}, {std::move(of_first), {}},
+        [this](std::size_t i) { return maps_[i]; }, options);
+  };
+  EXPECT_FALSE(fused({1}, 2).empty());
+  EXPECT_TRUE(fused({1, 1}, 3).empty());
+  const PointCloud once = fused({1}, 2), twice = fused({1, 0, 1}, 2);
+  ASSERT_EQ(twice.size(), once.size());
+  for (std::size_t i = 0; i < once.size(); ++i) {
+    ASSERT_EQ(twice[i].position, once[i].position) << i;
+  }
+}
+
 /// A wall that each view is little nearer to than the one it is compared with.
 TEST_F(Fusion, CoarsePointsAreNotHandedOnToEverFinerPixels) {
   Rig rig = demo_rig(side);
