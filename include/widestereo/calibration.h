@@ -41,13 +41,13 @@ struct Calibration {
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
 /// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg
-/// where the field of view is limited). Throws Error when there is no camera, one has no Kalibr
-/// form (skew, k3, ...), or the file cannot be written.
+/// where the field of view is limited). Throws Error for a rig that validate() refuses, where a
+/// camera has no Kalibr form (skew, k3, ...), and where the file cannot be written.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
 /// Writes a Basalt JSON; T_imu_cam of view 0 is the identity where no IMU is known, and the IMU's
-/// rate, biases and noise are Basalt's defaults. Throws Error when there is no camera, one has no
-/// Basalt form, or the file cannot be written.
+/// rate, biases and noise are Basalt's defaults. Throws Error for a rig that validate() refuses,
+/// where a camera has no Basalt form, and where the file cannot be written.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace widestereo

@@ -8,7 +8,6 @@
 
 #include "calibration/formats.h"
 #include "geometry/angle.h"
-#include "geometry/validation.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -228,7 +227,7 @@ Rig read_basalt(const Document& document) {
 
 void write_basalt(const std::filesystem::path& path, const Rig& rig) {
   using calibration::Json;
-  require_cameras(rig, "Cannot write " + path.string() + ": the rig");
+  validate(rig, "Cannot write " + path.string() + ": the rig");
   Json value;
   value["T_imu_cam"] = Json::array();
   value["intrinsics"] = Json::array();

@@ -9,7 +9,6 @@
 #include "calibration/formats.h"
 #include "calibration/yaml_camera.h"
 #include "geometry/angle.h"
-#include "geometry/validation.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -131,7 +130,7 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
 }  // namespace calibration
 
 void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
-  require_cameras(rig, "Cannot write " + path.string() + ": the rig");
+  validate(rig, "Cannot write " + path.string() + ": the rig");
   YAML::Emitter out;
   out << YAML::BeginMap;
   for (std::size_t i = 0; i < rig.views.size(); ++i) {

@@ -711,6 +711,22 @@ TEST(Writing, RefusesARigWithoutCameras) {
   }
 }
 
+TEST(Writing, RefusesWhatCouldNotBeReadAgain) {
+  const TemporaryFolder folder;
+  const Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  Rig no_focal_length = rig, no_position = rig;
+  no_focal_length.views[1].camera.fx = std::nan("");
+  no_position.views[1].world_from_camera.translation().y() = std::nan("");
+  for (const auto& write : {write_basalt, write_kalibr}) {
+    const auto error = [&](const Rig& wrong) {
+      return test::error_of([&] { write(folder / "a.txt", wrong); });
+    };
+    EXPECT_NE(error(no_focal_length).find("a.txt: the rig: cam1: fx is nan"), std::string::npos);
+    EXPECT_NE(error(no_position).find("a.txt: the rig: cam1: the pose is not"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(folder / "a.txt"));
+  }
+}
+
 TEST(Writing, RefusesWhatAFormatCannotHold) {
   const TemporaryFolder folder;
   const Rig rig = read_calibration(folder.write("stereo.yml", opencv_text)).rig;  // has skew
