@@ -124,7 +124,9 @@ cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range) {
   require_type(distance, CV_32FC1, "The distance map");
   const double low = 1 / range.farthest;
   const double high = 1 / range.nearest;
-  cv::Mat valid = distance > 0;
+  cv::Mat valid(distance.size(), CV_8UC1);
+  std::transform(distance.begin<float>(), distance.end<float>(), valid.begin<uchar>(),
+                 [](float value) { return has_distance(value) ? uchar{255} : uchar{0}; });
   cv::Mat share;
   cv::divide(1.0, distance, share, CV_32F);
   share = (share - low) / (high - low);
@@ -139,7 +141,8 @@ cv::Mat normal_picture(const cv::Mat& normals) {
   for (int y = 0; y < normals.rows; ++y) {
     for (int x = 0; x < normals.cols; ++x) {
       const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
-      if (n.dot(n) < 0.25f) continue;
+      const float squared_length = n.dot(n);
+      if (!(squared_length >= 0.25f) || std::isinf(squared_length)) continue;  // NaN, too
       picture.at<cv::Vec3b>(y, x) = {level((1 - n[2]) / 2), level((1 - n[1]) / 2),
                                      level((1 + n[0]) / 2)};
     }
@@ -149,8 +152,7 @@ cv::Mat normal_picture(const cv::Mat& normals) {
 
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high) {
   require_type(map, CV_32FC1, "The map to show");
-  return coloured((map - low) / (high - low), cv::Mat(map.size(), CV_8U, 255),
-                  cv::COLORMAP_VIRIDIS);
+  return coloured((map - low) / (high - low), map == map, cv::COLORMAP_VIRIDIS);  // NaN: no value
 }
 
 cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
@@ -178,11 +180,10 @@ cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_fr
     const Eigen::Vector3f p = (viewer * point.position.cast<double>()).cast<float>();
     if (p.z() <= 0) continue;
     const Eigen::Vector2f pixel = centre + focal / p.z() * p.head<2>();
-    // Left out before the conversion to whole numbers, which may overflow.
-    if (pixel.minCoeff() < -1 || pixel.x() > static_cast<float>(size.width) ||
-        pixel.y() > static_cast<float>(size.height)) {
-      continue;
-    }
+    // Told before the conversion to whole numbers, which may overflow; false for NaN.
+    const bool is_inside = pixel.x() >= -1 && pixel.x() <= static_cast<float>(size.width) &&
+                           pixel.y() >= -1 && pixel.y() <= static_cast<float>(size.height);
+    if (!is_inside) continue;
     const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
     const cv::Rect dot = cv::Rect(at.x - 1, at.y - 1, 3, 3) & cv::Rect({}, size);
     for (int y = dot.y; y < dot.y + dot.height; ++y) {

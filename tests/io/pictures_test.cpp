@@ -56,6 +56,22 @@ TEST(Pictures, NormalsHaveDocumentedColours) {
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(128, 255, 128));
 }
 
+TEST(Pictures, WhatIsNoNumberIsGrey) {
+  const cv::Vec3b grey(48, 48, 48);
+  const cv::Mat distance = (cv::Mat_<float>(1, 3) << INFINITY, NAN, 5);
+  const cv::Mat of_distance = distance_picture(distance, {1, 10});
+  cv::Mat normals(1, 3, CV_32FC3, cv::Scalar(0, 0, -1));
+  normals.at<cv::Vec3f>(0, 0) = {INFINITY, 0, 0};
+  normals.at<cv::Vec3f>(0, 1) = {0, NAN, -1};
+  const cv::Mat of_normals = normal_picture(normals);
+  const cv::Mat of_scalar = scalar_picture((cv::Mat_<float>(1, 3) << NAN, NAN, 0.5), 0, 1);
+  for (const cv::Mat& picture : {of_distance, of_normals, of_scalar}) {
+    EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), grey);
+    EXPECT_EQ(picture.at<cv::Vec3b>(0, 1), grey);
+    EXPECT_NE(picture.at<cv::Vec3b>(0, 2), grey);
+  }
+}
+
 TEST(Pictures, CloudsAreSeenFromTheViewpoint) {
   const auto point = [](float x, float y, float z, std::uint8_t red) {
     return CloudPoint{{x, y, z}, {0, 0, -1}, red, 0, 0, 1};
@@ -74,6 +90,18 @@ TEST(Pictures, CloudsAreSeenFromTheViewpoint) {
                 .at<cv::Vec3b>(10, 20),
             picture.at<cv::Vec3b>(0, 0))
       << "it looks the other way";
+}
+
+TEST(Pictures, PointsThatAreNotFiniteAreLeftOutOfClouds) {
+  const Eigen::Isometry3d viewer = Eigen::Isometry3d::Identity();
+  const cv::Mat empty = cloud_picture({}, viewer, {41, 21});
+  for (const float wrong : {NAN, INFINITY, -INFINITY}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      CloudPoint point{{0, 0, 2}, {0, 0, -1}, 20, 0, 0, 1};
+      point.position[axis] = wrong;
+      EXPECT_TRUE(same_bits(cloud_picture({point}, viewer, {41, 21}), empty)) << wrong << axis;
+    }
+  }
 }
 
 /// Floats are 0.5 m apart there.
