@@ -12,8 +12,8 @@ namespace widestereo {
 cv::Mat read_image(const std::filesystem::path& path);
 
 /// The 16-bit image of a camera with fewer bits, whose values end at `white` (4095 where it has
-/// 12), stretched to all of the 16. Throws Error for images of 8 bits and for values above; `name`
-/// begins the message.
+/// 12), stretched to all of the 16. Throws Error for empty images and those of 8 bits, for values
+/// above, and where `white` is not positive; `name` begins the message.
 cv::Mat stretched(const cv::Mat& image, int white, const std::string& name);
 
 /// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA
@@ -37,11 +37,11 @@ cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);
 
 /// Writes a CV_32FC1 or CV_32FC3 (x y z) map by extension: .tiff (32-bit float), .pfm, or .png (16
 /// bit, CV_32FC1 only: round(value * png_scale), 0 where not positive or not representable). Throws
-/// Error for other types and extensions, and as write_file() does.
+/// Error for empty maps, other types and extensions, and as write_file() does.
 void write_map(const std::filesystem::path& path, const cv::Mat& map, double png_scale = 1000.0);
 
-/// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension). Throws Error where the extension
-/// names no format that holds it, and as write_file() does.
+/// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension). Throws Error for empty images, where
+/// the extension names no format that holds it, and as write_file() does.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
 
 }  // namespace widestereo

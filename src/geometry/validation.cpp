@@ -114,8 +114,12 @@ void require_baseline(const View& a, const View& b, const std::string& name) {
               " have the same centre; stereo needs a baseline.");
 }
 
-void require_type(const cv::Mat& map, int type, const std::string& name) {
+void require_pixels(const cv::Mat& map, const std::string& name) {
   if (map.empty()) throw Error(name + " is empty; give one that has pixels.");
+}
+
+void require_type(const cv::Mat& map, int type, const std::string& name) {
+  require_pixels(map, name);
   if (map.type() == type) return;
   throw Error(name + " is " + cv::typeToString(map.type()) + " instead of " +
               cv::typeToString(type) + "; convert it or give another one.");

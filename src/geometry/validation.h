@@ -26,6 +26,8 @@ void require_cameras(const Rig& rig, const std::string& name);
 /// Throws Error where two views share a centre. `name` begins the message.
 void require_baseline(const View& a, const View& b, const std::string& name);
 
+/// Throws Error unless a map or an image has pixels. `name` begins the message.
+void require_pixels(const cv::Mat& map, const std::string& name);
 /// Throws Error unless a map has pixels, of a type such as CV_32FC1. `name` begins the message.
 void require_type(const cv::Mat& map, int type, const std::string& name);
 /// Throws Error unless a map has the size of the others of its view. `name` begins the message.

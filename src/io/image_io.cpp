@@ -14,6 +14,7 @@
 #include <span>
 #include <system_error>
 
+#include "geometry/validation.h"
 #include "io/pfm.h"
 #include "text/lower_case.h"
 #include "widestereo/error.h"
@@ -195,6 +196,11 @@ cv::Mat read_image(const fs::path& path) {
 }
 
 cv::Mat stretched(const cv::Mat& image, int white, const std::string& name) {
+  require_pixels(image, name);
+  if (white < 1) {
+    throw Error(name + " cannot be stretched from the white level " + std::to_string(white) +
+                "; give the largest value that its camera has, such as 4095.");
+  }
   if (image.depth() != CV_16U) {
     throw Error(name + " has no 16 bits, so that its white is known; leave the white level out.");
   }
@@ -279,6 +285,7 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
 }
 
 void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
+  require_pixels(map, "Cannot write " + path.string() + ": the map");
   if (map.type() != CV_32FC1 && map.type() != CV_32FC3) {
     throw Error("Cannot write " + path.string() + ": a map needs one or three float channels.");
   }
@@ -298,6 +305,7 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {
+  require_pixels(image, "Cannot write " + path.string() + ": the image");
   if (image.depth() != CV_8U && !keeps_depth(path.extension().string(), image)) refuse_format(path);
   encode(path, image);
 }

@@ -118,6 +118,20 @@ TEST(Maps, UnsupportedOnesAreRefused) {
   EXPECT_FALSE(std::filesystem::exists(folder / "a.png"));
 }
 
+TEST(Maps, WithoutPixelsAreNotWritten) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.pfm", "a.tiff", "a.png", "a.jpg"}) {
+    const std::string error = "Cannot write " + (folder / name).string() + ": the ";
+    for (const cv::Mat& empty : {cv::Mat(), cv::Mat(0, 0, CV_32FC1)}) {
+      EXPECT_EQ(error_of([&] { write_map(folder / name, empty); }),
+                error + "map is empty; give one that has pixels.");
+      EXPECT_EQ(error_of([&] { write_image(folder / name, empty); }),
+                error + "image is empty; give one that has pixels.");
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / name));
+  }
+}
+
 TEST(Images, KeepTheirDepthAndChannels) {
   const TemporaryFolder folder;
   for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3, CV_8UC4}) {
@@ -189,6 +203,14 @@ TEST(Images, OfFewerBitsAreStretched) {
             std::string::npos);
   EXPECT_NE(error_of([] { stretched(cv::Mat(2, 2, CV_8UC1), 4095, "x"); }).find("16 bits"),
             std::string::npos);
+  EXPECT_NE(error_of([] { stretched({}, 4095, "x"); }).find("x is empty"), std::string::npos);
+  for (const int white : {0, -1}) {
+    const cv::Mat black = cv::Mat::zeros(2, 2, CV_16UC1);
+    EXPECT_NE(error_of([&] {
+                stretched(black, white, "x");
+              }).find("the white level " + std::to_string(white) + ";"),
+              std::string::npos);
+  }
 }
 
 TEST(Images, MasksAreAllThatIsAboveZero) {
