@@ -166,7 +166,7 @@ struct Options {
   static std::vector<std::string> preset_names();
 };
 
-/// Throws Error naming the first value that is out of range.
+/// Throws Error naming the first value that is out of range or no enumerator.
 void validate(const Options& options);
 
 /// Every parameter as JSON text (an object).

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "widestereo/error.h"
 
@@ -32,10 +33,22 @@ std::string text(double number) {
   return nlohmann::json(number).dump();
 }
 
-void require_between(double value, double low, double high, const std::string& name) {
+std::string text(int number) { return std::to_string(number); }
+
+template <class Number>
+void require_between(Number value, std::type_identity_t<Number> low,
+                     std::type_identity_t<Number> high, const std::string& name) {
   if (value >= low && value <= high) return;  // false for NaN
   throw Error("The option " + name + " is " + text(value) + "; it must lie between " + text(low) +
               " and " + text(high) + ".");
+}
+
+template <class Enumeration>
+void require_known(Enumeration value, const std::string& name) {
+  // JSON has the first one's name for what is none.
+  if (nlohmann::json(value).get<Enumeration>() == value) return;
+  throw Error("The option " + name + " is " + text(static_cast<int>(value)) +
+              ", which no enumerator has; choose one of those in widestereo/options.h.");
 }
 
 }  // namespace
@@ -83,6 +96,13 @@ void validate(const Options& o) {
                 "farthest one between " +
                 text(Options::least_distance) + " and " + text(Options::most_distance) + " m.");
   }
+  require_known(o.search, "search");
+  require_known(o.warp, "warp");
+  require_known(o.sampling, "sampling");
+  require_known(o.propagation, "propagation");
+  require_known(o.pattern, "pattern");
+  require_known(o.interpolation, "interpolation");
+  require_known(o.filter, "filter");
   require_between(o.window_radius, 1, 15, "window radius");
   require_between(o.first_iterations, 1, 100000, "first iterations");
   require_between(o.second_iterations, 0, 100000, "second iterations");

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <type_traits>
 
 #include "error_of.h"
 
@@ -41,6 +42,36 @@ TEST(Options, RasterOrderBelongsToTheRandomSearch) {
   EXPECT_THAT(error_of_options(options), HasSubstr("checkerboard propagation"));
   options.search = SearchMethod::random;
   EXPECT_EQ(error_of_options(options), "");
+}
+
+TEST(Options, WholeNumbersArePrintedAsSuch) {
+  Options options;
+  options.levels = 0;
+  EXPECT_EQ(error_of_options(options), "The option levels is 0; it must lie between 1 and " +
+                                           std::to_string(Options::most_levels) + ".");
+}
+
+TEST(Options, NumbersThatNoEnumeratorHasAreNamed) {
+  const auto expect_refused = [](auto option, int count, const std::string& name) {
+    using Enumeration = std::remove_reference_t<decltype(Options().*option)>;
+    Options options;
+    for (int i = 0; i < count; ++i) {
+      options.*option = static_cast<Enumeration>(i);
+      EXPECT_EQ(error_of_options(options), "") << name << i;
+    }
+    for (const int unknown : {-1, count, 1000}) {
+      options.*option = static_cast<Enumeration>(unknown);
+      EXPECT_THAT(error_of_options(options), StartsWith("The option " + name + " is " +
+                                                        std::to_string(unknown) + ", which no"));
+    }
+  };
+  expect_refused(&Options::search, 2, "search");
+  expect_refused(&Options::warp, 3, "warp");
+  expect_refused(&Options::sampling, 2, "sampling");
+  expect_refused(&Options::propagation, 2, "propagation");
+  expect_refused(&Options::pattern, 2, "pattern");
+  expect_refused(&Options::interpolation, 2, "interpolation");
+  expect_refused(&Options::filter, 2, "filter");
 }
 
 template <class T>
