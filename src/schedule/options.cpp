@@ -201,7 +201,8 @@ std::string to_json(const Options& o) {
                                        {"min_confidence", o.min_confidence},
                                        {"ambiguity_margin", o.ambiguity_margin},
                                        {"fill_radius", o.fill_radius}};
-  return json.dump(2);
+  // The preset's name is the caller's and need not be UTF-8: what is not becomes U+FFFD.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 }  // namespace widestereo

@@ -74,6 +74,12 @@ TEST(Options, NumbersThatNoEnumeratorHasAreNamed) {
   expect_refused(&Options::filter, 2, "filter");
 }
 
+TEST(Options, NamesThatAreNoUtf8AreReplacedInJson) {
+  Options options;
+  options.preset = "\xff";
+  EXPECT_THAT(to_json(options), HasSubstr("\"preset\": \"\xef\xbf\xbd\""));
+}
+
 template <class T>
 struct Range {
   const char* name;
