@@ -97,7 +97,8 @@ struct WarmStart {
 };
 
 /// Matches images of one rig; made once, used for many frames of the same sizes.
-/// Not thread-safe; matchers are independent of each other and must not outlive their device.
+/// Not thread-safe; matchers are independent of each other, also those of one device in different
+/// threads, and must not outlive their device.
 class Matcher {
  public:
   /// Called between submissions with the share done in [0, 1]. What it throws ends the match.

@@ -29,7 +29,8 @@ namespace widestereo {
 /// What an application hands in to have matching done on its own device. The instance (its
 /// apiVersion) and the device must be of Vulkan 1.1 or newer and the queue family must compute; no
 /// feature or extension needs to be enabled, though one makes it faster. Nothing handed in is ever
-/// destroyed. Vulkan requires that nobody else uses `queue` during a call that submits.
+/// destroyed. Vulkan requires that nobody else, another matcher in another thread included, uses
+/// `queue` during a call that submits.
 struct VulkanHandles {
   PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
   VkInstance instance = VK_NULL_HANDLE;

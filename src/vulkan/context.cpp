@@ -128,6 +128,11 @@ std::uint32_t VulkanContext::memory_type(std::uint32_t allowed,
   return VK_MAX_MEMORY_TYPES;
 }
 
+VkResult VulkanContext::submit(const VkSubmitInfo& info, VkFence fence) const {
+  const std::lock_guard lock(queue_mutex_);
+  return functions_.vkQueueSubmit(handles_.queue, 1, &info, fence);
+}
+
 void VulkanContext::check(VkResult result, const std::string& action) const {
   widestereo::check(result, "The Vulkan device " + name(), action);
 }

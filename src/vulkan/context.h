@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 #include <string>
 
 #include "vulkan/functions.h"
@@ -39,6 +40,8 @@ class VulkanContext {
   bool filters_half_precision() const;
   /// First memory type of `allowed` with all of `wanted`, or VK_MAX_MEMORY_TYPES.
   std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
+  /// Hands commands to the queue, from one thread at a time: all matchers of a device share it.
+  VkResult submit(const VkSubmitInfo& info, VkFence fence) const;
   /// Throws Error when a call failed; `action` completes "could not ...".
   void check(VkResult result, const std::string& action) const;
 
@@ -67,6 +70,7 @@ class VulkanContext {
   OwnedDevice owned_;
   DeviceFunctions functions_;
   std::uint32_t timestamp_bits_ = 0;
+  mutable std::mutex queue_mutex_;
 };
 
 }  // namespace widestereo

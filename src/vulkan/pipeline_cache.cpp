@@ -109,6 +109,7 @@ std::vector<char> PipelineCache::data() const {
 
 void PipelineCache::save() {
   if (path_.empty()) return;
+  const std::lock_guard lock(saving_);
   std::vector<char> current = data();
   if (current == saved_) return;
   if (!may_be_replaced(path_)) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <mutex>
 #include <vector>
 
 #include "vulkan/context.h"
@@ -10,6 +11,7 @@ namespace widestereo {
 
 /// Compiled pipelines kept in a file between runs. The file carries a checksum and is used only if
 /// it is intact and of this very device and driver; other caches are ignored and replaced.
+/// Matchers may be made in several threads at once: Vulkan itself guards get().
 class PipelineCache {
  public:
   /// `path`: empty for a cache that is not kept.
@@ -26,6 +28,7 @@ class PipelineCache {
 
   const VulkanContext& context_;
   std::filesystem::path path_;
+  std::mutex saving_;
   std::vector<char> saved_;  // what the file holds
   Handle<VkPipelineCache> cache_;
 };

@@ -70,7 +70,7 @@ void Submission::submit() {
   info.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
   info.commandBufferCount = 1;
   info.pCommandBuffers = &commands_;
-  context_.check(vk.vkQueueSubmit(context_.queue(), 1, &info, fence), "run commands");
+  context_.check(context_.submit(info, fence), "run commands");
   in_flight_ = true;
 }
 

@@ -4,13 +4,16 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <set>
 
 #include "bytes_of.h"
 #include "device_fixture.h"
+#include "match_fixture.h"
 #include "same_bits.h"
 #include "schedule/bands.h"
 #include "vulkan/physical_device.h"
@@ -460,6 +463,35 @@ TEST(VulkanValidation, MissingLayerIsAnError) {
   EXPECT_EQ(error_of([&] { open_vulkan_device(0, {}, get); }), "");
 }
 
+Handle<VkCommandPool> command_pool(const VulkanContext& context) {
+  VkCommandPoolCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+  info.queueFamilyIndex = context.queue_family();
+  VkCommandPool pool = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateCommandPool(context.device(), &info, nullptr, &pool),
+                "make a command pool");
+  return context.own(pool, context.vk().vkDestroyCommandPool);
+}
+
+/// Matchers of one device share its queue, which Vulkan lets one thread at a time use.
+TEST(VulkanValidation, HasNothingToSayOfSubmissionsFromTwoThreads) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  const auto submit_often = [&application] {
+    const auto pool = command_pool(application.context);
+    Submission submission(application.context, pool.get(), 2);
+    for (int i = 0; i < 1000; ++i) {
+      submission.begin();
+      submission.submit();
+    }
+  };
+  auto other = std::async(std::launch::async, submit_often);
+  submit_often();
+  other.get();
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
 TEST(VulkanValidation, ReportsAMissingBarrier) {
   REQUIRE_VULKAN_OR_SKIP();
   // The net must catch something: two clears of one image without a barrier between.
@@ -467,12 +499,7 @@ TEST(VulkanValidation, ReportsAMissingBarrier) {
   const VulkanContext& context = application.context;
   const DeviceFunctions& vk = context.vk();
   const Buffer buffer = make_device_buffer(context, 64, VK_BUFFER_USAGE_TRANSFER_DST_BIT, "a test");
-  VkCommandPoolCreateInfo pool_info{};
-  pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-  VkCommandPool pool_handle = VK_NULL_HANDLE;
-  ASSERT_EQ(vk.vkCreateCommandPool(context.device(), &pool_info, nullptr, &pool_handle),
-            VK_SUCCESS);
-  const auto pool = context.own(pool_handle, vk.vkDestroyCommandPool);
+  const auto pool = command_pool(context);
   Submission submission(context, pool.get(), 2);
   const VkCommandBuffer commands = submission.begin();
   const float zeros[16] = {};
@@ -599,6 +626,24 @@ TEST_F(VulkanCache, IsWrittenAndUsed) {
   const std::string written = content();
   EXPECT_TRUE(same_bits(first, match_with_cache()));
   EXPECT_EQ(content(), written);
+}
+
+/// Matchers of one device have its queue and its cache in common.
+TEST_F(VulkanCache, AndQueueAreSharedByMatchersInDifferentThreads) {
+  const RenderedPair pair = render_demo(demo_size);
+  const Options options = options_of_small_match("fast");
+  Device device = Device::open({.device = "vulkan:0",
+                                .validation = true,
+                                .pipeline_cache = path_.string(),
+                                .max_samples_per_dispatch = 40000});  // many submissions
+  const auto match = [&] { return Matcher(device, pair.rig, options).match(images_of(pair)); };
+  auto first = std::async(std::launch::async, match);
+  auto second = std::async(std::launch::async, match);
+  const std::array results = {first.get(), second.get()};
+  const StereoResult alone = match();
+  for (const StereoResult& result : results) expect_same_bits(alone, result);
+  expect_no_validation_messages(device);
+  EXPECT_TRUE(is_used());
 }
 
 TEST_F(VulkanCache, DamagedFilesAreIgnoredAndReplaced) {
