@@ -117,14 +117,14 @@ class VulkanMatcher {
                       std::span<const VulkanViewMaps> maps) const;
 
   /// Records one match, outside a render pass, into a command buffer for a queue of the handles'
-  /// family: reads the images and writes the maps. Neither submits, waits nor allocates. It waits
-  /// for earlier compute and transfer commands of the queue; images that other stages write, and
-  /// the layouts of textures, need a barrier before it (to VK_ACCESS_SHADER_READ_BIT of the compute
-  /// stage), and where other stages still read the maps, their next match needs one from these to
-  /// the compute stage. Whoever reads the maps puts one behind it (from VK_ACCESS_SHADER_WRITE_BIT
-  /// of the compute stage), and so does whoever writes the next images. Leaves its own compute
-  /// pipeline, descriptor sets and push constants bound. May be submitted again and again. Where
-  /// nothing overlaps, all costs are 2.
+  /// family: reads the images and writes the maps. Neither submits, waits nor allocates device
+  /// memory. The commands wait for earlier compute and transfer commands of the queue; images that
+  /// other stages write, and the layouts of textures, need a barrier before them (to
+  /// VK_ACCESS_SHADER_READ_BIT of the compute stage), and where other stages still read the maps,
+  /// their next match needs one from these to the compute stage. Whoever reads the maps puts one
+  /// behind them (from VK_ACCESS_SHADER_WRITE_BIT of the compute stage), and so does whoever writes
+  /// the next images. Leaves its own compute pipeline, descriptor sets and push constants bound.
+  /// May be submitted again and again. Where nothing overlaps, all costs are 2.
   void record(VkCommandBuffer commands, const VulkanBindings& bindings);
 
   /// Spreads the match over several command buffers of about the same work, to be submitted in this
