@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <concepts>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,8 +34,8 @@ struct DeviceRequest {
   /// "vulkan", and either of the two with ":INDEX", ":NAME PART" or ":UUID"; a number is an index.
   std::string device = "auto";
   bool validation = false;  ///< Vulkan: validation layers with synchronization validation
-  std::string
-      pipeline_cache;  ///< Vulkan: file that keeps compiled pipelines between runs, empty for none
+  /// Vulkan: file that keeps compiled pipelines between runs, empty for none.
+  std::string pipeline_cache = {};
   /// GPUs: longest dispatch in patch samples, so that slow devices answer within watchdog limits;
   /// 0 chooses by device. The result does not depend on it.
   long max_samples_per_dispatch = 0;
@@ -48,8 +49,12 @@ class Device {
   /// naming the cause and the remedy. "auto" passes such devices over (note()), "cpu" is always
   /// there; neither throws.
   static Device open(const DeviceRequest& request);
-  /// The same with the other requests at their defaults.
-  static Device open(const std::string& device);
+  /// The same with the other requests at their defaults. A template, which no braces call: to
+  /// g++ 12 {.device = "cpu"} could be a string, too.
+  template <std::convertible_to<std::string> Name>
+  static Device open(const Name& device) {
+    return open(DeviceRequest{.device = device});
+  }
   /// All devices of this machine, best first, the CPU last. Never throws for a missing driver.
   static std::vector<DeviceInfo> list();
   /// Why list() has no device of this kind, one sentence; empty if it has.

@@ -170,12 +170,6 @@ Device Device::open(const DeviceRequest& request) {
       ":UUID (`widestereo devices` lists them).");
 }
 
-Device Device::open(const std::string& device) {
-  DeviceRequest request;
-  request.device = device;
-  return open(request);
-}
-
 std::vector<DeviceInfo> Device::list() {
   std::vector<DeviceInfo> devices;
   for (const Api& api : apis) {

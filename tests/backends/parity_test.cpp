@@ -743,6 +743,15 @@ TEST(AcceptedDistance, IsThatOfPixelsThatAreNotRejectedOrFilledAllTheSame) {
   EXPECT_TRUE(same_bits(accepted_distance(view), expected));
 }
 
+TEST(DeviceChoice, IsByNameOrByRequest) {
+  const std::string name = "cpu";
+  for (const Device& device :
+       {Device::open("cpu"), Device::open(name), Device::open({.device = "cpu"}),
+        Device::open({.device = "cpu", .validation = true})}) {
+    EXPECT_EQ(device.info().id, "cpu");
+  }
+}
+
 TEST(DeviceChoice, UnknownNamesAreErrors) {
   EXPECT_THROW(Device::open("gpu"), Error);
   EXPECT_THROW(Device::open("vulkan:no such device"), Error);
