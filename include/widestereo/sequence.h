@@ -24,11 +24,12 @@ struct SequenceFrame {
 std::optional<std::int64_t> time_in_name(const std::string& name);
 
 /// Frames of a data set in the order of time, for these cameras. Layouts: FOLDER/camN/ with images,
-/// frames being those of equal names, in numerical (or alphabetical) order; or EuRoC and TUM VI:
-/// FOLDER[/mav0]/camN/data/ with camN/data.csv (`#timestamp [ns],filename`), frames being those of
-/// equal times. Without that list frames have the time in their names. Throws Error for missing
-/// folders, two cameras with one folder, no images, or a frame that some camera lacks unless those
-/// are to be skipped, with those of which a listed file is missing.
+/// frames being those of equal names, in alphabetical order but for numbers within names, which
+/// count as numbers; or EuRoC and TUM VI: FOLDER[/mav0]/camN/data/ with camN/data.csv (`#timestamp
+/// [ns],filename`), frames being those of equal times. Without that list frames have the time in
+/// their names. Throws Error for missing folders, two cameras with one folder, no images, or a
+/// frame that some camera lacks unless those are to be skipped, with those of which a listed file
+/// is missing.
 std::vector<SequenceFrame> read_sequence(const std::filesystem::path& folder,
                                          const std::vector<int>& cameras,
                                          bool skip_incomplete = false);

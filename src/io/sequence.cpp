@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 
+#include "io/frame_times.h"
 #include "text/byte_order_mark.h"
 #include "text/lower_case.h"
 #include "widestereo/error.h"
@@ -23,23 +24,46 @@ bool is_image(const fs::path& path) {
   return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
 }
 
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 bool is_number(const std::string& text) {
-  return !text.empty() &&
-         std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+  return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
 }
 
-/// Numbers in their order, before all other names.
+/// Numbers within names count as numbers, so that frame_2 is before frame_10.
 struct InOrder {
   bool operator()(const std::string& a, const std::string& b) const {
-    if (is_number(a) != is_number(b)) return is_number(a);
-    if (!is_number(a)) return a < b;
-    const std::string_view x = significant(a);
-    const std::string_view y = significant(b);
-    if (x.size() != y.size()) return x.size() < y.size();
-    return x != y ? x < y : a < b;  // 7 and 007 are two names
+    std::string_view x = a;
+    std::string_view y = b;
+    while (!x.empty() && !y.empty()) {
+      const std::string_view part_of_x = first_part(x);
+      const std::string_view part_of_y = first_part(y);
+      const bool are_numbers = is_digit(x.front()) && is_digit(y.front());
+      const int order =
+          are_numbers ? compare_numbers(part_of_x, part_of_y) : part_of_x.compare(part_of_y);
+      if (order != 0) return order < 0;
+      x.remove_prefix(part_of_x.size());
+      y.remove_prefix(part_of_y.size());
+    }
+    if (x.empty() != y.empty()) return x.empty();
+    return a < b;  // 7 and 007 are two names
   }
-  static std::string_view significant(const std::string& number) {
-    return std::string_view(number).substr(std::min(number.find_first_not_of('0'), number.size()));
+
+ private:
+  /// A whole number, or one character.
+  static std::string_view first_part(std::string_view text) {
+    if (!is_digit(text.front())) return text.substr(0, 1);
+    const auto end = std::find_if_not(text.begin(), text.end(), is_digit);
+    return text.substr(0, static_cast<std::size_t>(end - text.begin()));
+  }
+  /// Of any length.
+  static int compare_numbers(std::string_view a, std::string_view b) {
+    a = significant(a);
+    b = significant(b);
+    return a.size() != b.size() ? (a.size() < b.size() ? -1 : 1) : a.compare(b);
+  }
+  static std::string_view significant(std::string_view number) {
+    return number.substr(std::min(number.find_first_not_of('0'), number.size()));
   }
 };
 
@@ -203,12 +227,12 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool ski
   for (const Images& of_camera : images) {
     for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
   }
-  const bool have_times = std::any_of(images.begin(), images.end(),
+  const bool are_listed = std::any_of(images.begin(), images.end(),
                                       [](const Images& of_camera) { return of_camera.listed; });
   std::vector<SequenceFrame> frames;
   for (const auto& [key, count] : counts) {
     SequenceFrame frame;
-    frame.nanoseconds = have_times ? whole_number(key) : time_in_name(key);
+    frame.nanoseconds = are_listed ? whole_number(key) : time_in_name(key);
     for (std::size_t i = 0; i < images.size(); ++i) {
       const auto found = images[i].of_frames.find(key);
       if (found != images[i].of_frames.end()) {
@@ -230,6 +254,11 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool ski
                 "; images of one frame must have equal names or times.");
   }
   require_usable_names(frames);
+  // Fractions of a second in names are of any number of digits: 7.5 is after 7.25.
+  if (have_times(frames)) {
+    std::stable_sort(frames.begin(), frames.end(),
+                     [](const auto& a, const auto& b) { return a.nanoseconds < b.nanoseconds; });
+  }
   return frames;
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "io/frame_times.h"
 #include "text/byte_order_mark.h"
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -155,11 +156,8 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
   const auto is_earlier = [](const StampedPose& a, const StampedPose& b) {
     return a.seconds < b.seconds;
   };
-  const bool have_times = std::all_of(frames.begin(), frames.end(), [](const SequenceFrame& frame) {
-    return frame.nanoseconds.has_value();
-  });
   std::vector<Eigen::Isometry3d> poses;
-  if (!have_times) {
+  if (!have_times(frames)) {
     if (trajectory.size() != frames.size()) {
       throw Error(name + " has " + std::to_string(trajectory.size()) + " poses for " +
                   std::to_string(frames.size()) +

@@ -50,6 +50,27 @@ TEST_F(Sequences, FoldersAreMatchedByNameInNumericalOrder) {
   EXPECT_FALSE(frames[0].nanoseconds.has_value());
 }
 
+TEST_F(Sequences, NumbersWithinNamesCountAsNumbers) {
+  for (const char* name : {"left_1", "left_10", "left_2", "left_02", "left_9b", "left", "Right_3",
+                           "a2b10", "a2b9", "a10b1", "a99999999999999999999999"}) {
+    add("cam0/" + std::string(name) + ".png");
+    add("cam1/" + std::string(name) + ".png");
+  }
+  const auto frames = read_sequence(folder_.path(), {0, 1});
+  EXPECT_EQ(names(frames), (std::vector<std::string>{"Right_3", "a2b9", "a2b10", "a10b1",
+                                                     "a99999999999999999999999", "left", "left_1",
+                                                     "left_02", "left_2", "left_9b", "left_10"}));
+  EXPECT_EQ(frames[10].images[1], folder_ / "cam1/left_10.png");
+}
+
+TEST_F(Sequences, TimesInNamesMayHaveFractionsOfAnyLength) {
+  for (const char* name : {"b-1305031102.5", "a-1305031103", "b-1305031102.25"}) {
+    add("cam0/" + std::string(name) + ".png");
+  }
+  EXPECT_EQ(names(read_sequence(folder_.path(), {0})),
+            (std::vector<std::string>{"b-1305031102.25", "b-1305031102.5", "a-1305031103"}));
+}
+
 TEST_F(Sequences, EurocListsAreMatchedByTime) {
   const std::string header = "#timestamp [ns],filename\r\n";
   add("mav0/cam0/data.csv", header + "1403636579763555584,a.png\r\n1403636579813555456,b.png\r\n");

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "widestereo/sequence.h"
+
+namespace widestereo {
+
+/// Whether all frames have one, without which they have an order alone.
+inline bool have_times(const std::vector<SequenceFrame>& frames) {
+  return std::all_of(frames.begin(), frames.end(),
+                     [](const SequenceFrame& frame) { return frame.nanoseconds.has_value(); });
+}
+
+}  // namespace widestereo
