@@ -46,6 +46,7 @@ enum class Body { camera, imu };
 struct StampedPose {
   double seconds = 0;
   Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();  ///< metres
+  int line = 0;  ///< of the file, from 1; 0 where it is of none
 };
 
 struct Trajectory {
@@ -65,8 +66,9 @@ std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
                                          const Eigen::Isometry3d& camera_from_imu);
 
 /// The poses of the chosen ones among all frames (by index): the one nearest in time, within
-/// `tolerance` seconds, where frames have times; else in their order, where there are as many and
-/// their times do not go back. Throws Error otherwise; `name` (of the file) begins the message.
+/// `tolerance` seconds, where frames have times, and no two poses of one time may differ then; else
+/// in their order, where there are as many and their times do not go back. Throws Error otherwise;
+/// `name` (of the file) begins the message.
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
                                                const std::vector<std::size_t>& chosen,
                                                std::vector<StampedPose> trajectory,

@@ -110,9 +110,29 @@ class PoseLine {
   std::size_t columns_;
 };
 
+/// Of two that differ, which one is right nobody could tell.
+void require_one_pose_a_time(const std::vector<StampedPose>& sorted, const std::string& name) {
+  const auto first = std::adjacent_find(
+      sorted.begin(), sorted.end(), [](const StampedPose& a, const StampedPose& b) {
+        return a.seconds == b.seconds && a.world_from_body.matrix() != b.world_from_body.matrix();
+      });
+  if (first == sorted.end()) return;
+  const StampedPose& second = *(first + 1);
+  const bool are_of_lines = first->line > 0 && second.line > 0;
+  throw Error(name + " has two poses of the time " + text_of(first->seconds) +
+              (are_of_lines ? ", in line " + std::to_string(first->line) + " and in line " +
+                                  std::to_string(second.line)
+                            : "") +
+              "; leave one.");
+}
+
 }  // namespace
 
 Trajectory read_trajectory(const std::filesystem::path& path) {
+  std::error_code ignored;  // a file that cannot be opened is refused next
+  if (std::filesystem::is_directory(path, ignored)) {
+    throw Error("The poses " + path.string() + " are a folder; give the file in it.");
+  }
   std::ifstream file(path);
   if (!file) throw Error("Cannot read the poses " + path.string() + "; check the path.");
   skip_byte_order_mark(file);
@@ -134,8 +154,12 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
     }
     trajectory.poses.push_back(
         layout->pose(line, path.string() + " line " + std::to_string(number)));
+    trajectory.poses.back().line = number;
   }
-  if (!layout) throw Error("There are no poses in " + path.string() + ".");
+  if (!layout) {
+    throw Error("There are no poses in " + path.string() +
+                "; give a TUM trajectory, or the data.csv of EuRoC's or TUM VI's ground truth.");
+  }
   if (layout->comma_separated()) trajectory.body = Body::imu;
   return trajectory;
 }
@@ -175,6 +199,7 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
   }
   if (trajectory.empty()) throw Error("There are no poses in " + name + ".");
   std::stable_sort(trajectory.begin(), trajectory.end(), is_earlier);
+  require_one_pose_a_time(trajectory, name);
   for (const std::size_t i : chosen) {
     const SequenceFrame& frame = frames[i];
     const double seconds = static_cast<double>(*frame.nanoseconds) * 1e-9;

@@ -343,6 +343,9 @@ TEST_F(Trajectories, DoNotDependOnTheLocale) {
 TEST_F(Trajectories, BrokenLinesAreNamed) {
   EXPECT_THAT(error_of([&] { read_trajectory(folder_ / "none.txt"); }), HasSubstr("none.txt"));
   EXPECT_THAT(error_of_text("# nothing\n"), HasSubstr("no poses"));
+  EXPECT_THAT(error_of_text(""), HasSubstr("poses.txt; give a TUM trajectory"));
+  EXPECT_THAT(error_of([&] { read_trajectory(folder_.path()); }),
+              HasSubstr(folder_.path().string() + " are a folder; give the file in it."));
   EXPECT_THAT(error_of_text("#\n1 2 3 4 0 0 0\n"), HasSubstr("line 2 has 7 numbers"));
   EXPECT_THAT(error_of_text("1 2 3 4 0 0 0 1 5\n"), HasSubstr("line 1"));
   for (const char* no_number : {"nan", "inf", "1e999", "+-5", "+", "0x10", "5m"}) {
@@ -408,6 +411,23 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, {}, 0.01, "p"); }),
               HasSubstr("no poses in p"));
+}
+
+TEST_F(Trajectories, TwoPosesOfOneTimeMustBeTheSame) {
+  const std::vector<SequenceFrame> frames = {{"2", {}, 2'000'000'000}};
+  const auto error_with = [&](const std::string& line) {
+    folder_.write("poses.txt", "# poses\n1.5 0 0 0 0 0 0 1\n2 1 0 0 0 0 0 1\n" + line + "\n");
+    return error_of([&] {
+      poses_of_frames(frames, {0}, read_trajectory(folder_ / "poses.txt").poses, 0.01, "p");
+    });
+  };
+  EXPECT_EQ(error_with("2 1 0 0 0 0 0 1"), "");
+  EXPECT_EQ(error_with("1.5 1 0 0 0 0 0 1"),
+            "p has two poses of the time 1.5, in line 2 and in line 4; leave one.");
+  std::vector<StampedPose> of_no_file(2);
+  of_no_file[1].world_from_body.translation().x() = 1;
+  EXPECT_EQ(error_of([&] { poses_of_frames(frames, {0}, of_no_file, 5, "p"); }),
+            "p has two poses of the time 0; leave one.");
 }
 
 TEST_F(Trajectories, BelongToFramesByOrderOnlyWhereSortedByTime) {
