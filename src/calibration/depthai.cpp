@@ -62,7 +62,7 @@ Camera read_camera(const Document& document, const std::string& name, const Yaml
                   ": The cameraType is none of 0 (perspective) and 1 (fisheye), with the "
                   "coefficients of one.");
   }
-  set_matrix(camera, keys.matrix("intrinsicMatrix"));
+  set_matrix(camera, document, name + ": The intrinsicMatrix", keys.matrix("intrinsicMatrix"));
   camera.width = keys.side("width");
   camera.height = keys.side("height");
   return camera;

@@ -45,8 +45,9 @@ void set_fisheye(Camera& camera, std::span<const double> coefficients);
 /// allow. Fails where those of a tilted sensor are not 0; `what` has them.
 Camera rational_camera(const Document& document, const std::string& what,
                        std::span<const double> coefficients);
-/// Focal lengths, skew and centre of a camera matrix.
-void set_matrix(Camera& camera, const Eigen::Matrix3d& k);
+/// Focal lengths, skew and centre of a camera matrix, `what`. Fails where it is none.
+void set_matrix(Camera& camera, const Document& document, const std::string& what,
+                const Eigen::Matrix3d& k);
 
 /// The same camera in a simpler model, where what a rational or thin prism model has more is 0.
 Camera simplified(Camera camera);

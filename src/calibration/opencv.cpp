@@ -2,6 +2,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <initializer_list>
 #include <iterator>
 #include <opencv2/calib3d.hpp>
@@ -94,10 +95,12 @@ class Storage {
     const cv::Mat height = matrix({"image_height", "height", "image_Height"});
     if (both.total() == 2) return size_of(both.at<double>(0), both.at<double>(1));
     if (!both.empty()) refuse_size();
-    if (!width.empty() && !height.empty()) {
-      return size_of(width.at<double>(0), height.at<double>(0));
+    if (width.empty() != height.empty()) {
+      document_.fail(width.empty()
+                         ? "It has its images' height without their width; add image_width."
+                         : "It has its images' width without their height; add image_height.");
     }
-    return {};
+    return width.empty() ? cv::Size() : size_of(width.at<double>(0), height.at<double>(0));
   }
 
  private:
@@ -203,14 +206,19 @@ Camera read_lens(const Document& document, const Storage& storage, const CameraK
 
 Camera read_camera(const Document& document, const Storage& storage, const CameraKeys& keys,
                    cv::Size size) {
-  const cv::Mat k =
-      storage.required(keys.k, 9, "camera matrix").reshape(1, 1).colRange(0, 9).reshape(1, 3);
+  const std::string what = std::string(keys.name) + ": The camera matrix (" + *keys.k.begin() + ")";
+  cv::Mat k = storage.required(keys.k, 9, "camera matrix");
+  if (k.total() != 9) {
+    document.fail(what + " is " + std::to_string(k.rows) + "x" + std::to_string(k.cols) +
+                  " instead of 3x3; correct it.");
+  }
+  k = k.reshape(1, 3);
   Camera camera = read_lens(document, storage, keys);
   camera.width = size.width;
   camera.height = size.height;
   Eigen::Matrix3d matrix;
   cv::cv2eigen(k, matrix);
-  set_matrix(camera, matrix);
+  set_matrix(camera, document, what, matrix);
   return camera;
 }
 
@@ -225,6 +233,10 @@ Eigen::Isometry3d second_from_first(const Storage& storage, const Document& docu
   cv::Mat rotation = part({"R", "rotation", "R_stereo", "rvec", "om"}, 0, "rotation");
   if (rotation.total() == 3) cv::Rodrigues(rotation.clone().reshape(1, 3), rotation);
   const cv::Mat translation = part({"T", "t", "tvec", "translation"}, 3, "translation");
+  if (translation.total() != 3) {
+    document.fail("The translation (T) has " + std::to_string(translation.total()) +
+                  " numbers instead of three; correct it.");
+  }
   if (rotation.rows != 3 || rotation.cols != 3) document.fail("The rotation R must be 3x3.");
   Eigen::Matrix3d r;
   cv::cv2eigen(rotation, r);
@@ -256,7 +268,19 @@ Camera rational_camera(const Document& document, const std::string& what,
   return simplified(camera);
 }
 
-void set_matrix(Camera& camera, const Eigen::Matrix3d& k) {
+void set_matrix(Camera& camera, const Document& document, const std::string& what,
+                const Eigen::Matrix3d& k) {
+  constexpr double rounding = 1e-9;
+  const auto has_form = [](const Eigen::Matrix3d& m) {
+    return std::abs(m(1, 0)) <= rounding &&
+           (m.row(2) - Eigen::RowVector3d::UnitZ()).norm() <= rounding;
+  };
+  if (!has_form(k)) {
+    document.fail(
+        what +
+        (has_form(k.transpose()) ? " is transposed, as MATLAB has it" : " is no camera matrix") +
+        "; write its rows as fx, skew, cx, then 0, fy, cy, then 0, 0, 1.");
+  }
   camera.fx = k(0, 0);
   camera.skew = k(0, 1);
   camera.cx = k(0, 2);

@@ -295,6 +295,46 @@ TEST(OpenCv, RefusesSizesThatAreNotWhole) {
   }
 }
 
+TEST(OpenCv, RefusesAWidthWithoutAHeight) {
+  const TemporaryFolder folder;
+  for (const std::string side : {"width", "height"}) {
+    const auto path = folder.write("stereo.yml", replaced(opencv_text, "image_" + side, "x"));
+    const std::string error = test::error_of([&] { read_calibration(path, {640, 480}); });
+    EXPECT_NE(error.find("add image_" + side + "."), std::string::npos) << error;
+  }
+}
+
+TEST(OpenCv, RefusesWhatIsNoCameraMatrix) {
+  const TemporaryFolder folder;
+  const std::string matrix = "[ 391.8, 0., 620.6, 0., 392.6, 489.2, 0., 0., 1. ]";
+  const auto error_with = [&](const std::string& text) {
+    return error_of(folder.write("stereo.yml", text));
+  };
+  const auto expect = [&](const std::string& other, const char* part) {
+    const std::string error = error_with(replaced(opencv_text, matrix, other));
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+  };
+  expect("[ 391.8, 0., 0., 0., 392.6, 0., 620.6, 489.2, 1. ]",
+         "cam1: The camera matrix (K2) is transposed, as MATLAB has it; write its rows as fx");
+  expect("[ 391.8, 0., 620.6, 0.1, 392.6, 489.2, 0., 0., 1. ]", "(K2) is no camera matrix");
+  expect("[ 391.8, 0., 620.6, 0., 392.6, 489.2, 0., 0., 2. ]", "(K2) is no camera matrix");
+  const std::string wide =
+      replaced(replaced(opencv_text, "cols: 3", "cols: 4"), "631.6, 0., 393.2, 493.2, 0., 0., 1.",
+               "631.6, 0., 0., 393.2, 493.2, 0., 0., 0., 1., 0.");
+  EXPECT_NE(error_with(wide).find("(K1) is 3x4 instead of 3x3"), std::string::npos)
+      << error_with(wide);
+}
+
+TEST(OpenCv, RefusesATranslationOfMoreThanThreeNumbers) {
+  const TemporaryFolder folder;
+  const std::string text = replaced(
+      opencv_text, "   rows: 3\n   cols: 1\n   dt: d\n   data: [ -0.125, 0., 0. ]",
+      "   rows: 3\n   cols: 3\n   dt: d\n   data: [ 0., 0.1, 0., -0.1, 0., 0., 0., 0., 0. ]");
+  const std::string error = error_of(folder.write("stereo.yml", text));
+  EXPECT_NE(error.find("The translation (T) has 9 numbers instead of three"), std::string::npos)
+      << error;
+}
+
 /// As OpenCV writes a cv::Size or a cv::Mat.
 TEST(OpenCv, SizesMayBeListsAndMatricesByEveryName) {
   const TemporaryFolder folder;

@@ -117,6 +117,9 @@ TEST_F(DepthAi, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(error(replaced("0, 0, 0, 0, 0, 0]", "0, 0, 0, 0, 0.1, 0]")),
               HasSubstr("CALIB_TILTED_MODEL"));
   EXPECT_THAT(error(replaced("[[570.5, 0.0, 640.25]", "[[570.5, 0.0]")), HasSubstr("3x3 matrix"));
+  EXPECT_THAT(error(replaced("[[570.5, 0.0, 640.25], [0.0, 571.5, 400.75], [0.0, 0.0, 1.0]]",
+                             "[[570.5, 0.0, 0.0], [0.0, 571.5, 0.0], [640.25, 400.75, 1.0]]")),
+              HasSubstr("CAM_A: The intrinsicMatrix is transposed"));
   EXPECT_THAT(error(replaced("[1, {", "[0, {")), HasSubstr("socket twice"));
   EXPECT_THAT(error(replaced("[1, {", "[99, {")), HasSubstr("pairs of a socket"));
   EXPECT_THAT(error(replaced("\"x\": -3.75", "\"u\": -3.75")), HasSubstr("The key x is missing"));
