@@ -161,6 +161,7 @@ void read_cameras(TextFile file, const OnCamera& visit) {
     for (std::size_t i = 0; i < camera.model->parameters(); ++i) {
       camera.parameters.push_back(file.read<double>("parameters of its camera model"));
     }
+    if (file.has_more()) file.fail("has more parameters than its camera model");
     visit(std::move(camera));
   }
 }
@@ -185,10 +186,10 @@ void read_cameras(BinaryFile file, const OnCamera& visit) {
 
 void read_images(TextFile file, const OnImage& visit) {
   while (file.next_record()) {
-    file.read<std::uint64_t>("an image's number");
+    ColmapImage image;
+    image.number = file.read<std::uint64_t>("an image's number");
     std::array<double, 7> pose{};
     for (double& value : pose) value = file.read<double>("numbers of a pose");
-    ColmapImage image;
     image.camera = file.read<std::uint64_t>("a camera's number");
     image.name = file.rest();
     if (image.name.empty()) file.fail("lacks the image's name");
@@ -209,10 +210,10 @@ void read_images(TextFile file, const OnImage& visit) {
 void read_images(BinaryFile file, const OnImage& visit) {
   const auto count = file.read<std::uint64_t>();
   for (std::uint64_t i = 0; i < count; ++i) {
-    file.read<std::uint32_t>();  // its number
+    ColmapImage image;
+    image.number = file.read<std::uint32_t>();
     std::array<double, 7> pose{};
     file.read_bytes(pose.data(), sizeof pose);
-    ColmapImage image;
     image.camera = file.read<std::uint32_t>();
     image.name = file.read_name();
     image.camera_from_world = pose_of(pose, file.where() + ": " + image.name);

@@ -15,6 +15,7 @@
 namespace widestereo::calibration {
 
 struct ColmapImage {
+  std::uint64_t number = 0;  ///< COLMAP's
   std::string name;
   Eigen::Isometry3d camera_from_world = Eigen::Isometry3d::Identity();
   std::uint64_t camera = 0;

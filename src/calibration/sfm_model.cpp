@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "calibration/colmap_files.h"
 #include "calibration/nerfstudio.h"
@@ -68,17 +69,28 @@ void require_colmap(const fs::path& path) {
               "transforms.json.");
 }
 
+[[noreturn]] void refuse_two(const fs::path& file, const std::string& things,
+                             std::uint64_t number) {
+  throw Error(file.string() + " has two " + things + " of the number " + std::to_string(number) +
+              "; export the model again (colmap model_converter).");
+}
+
 std::map<std::uint64_t, ColmapCamera> cameras_of(const fs::path& file) {
   std::map<std::uint64_t, ColmapCamera> cameras;
-  calibration::each_colmap_camera(
-      file, [&](const ColmapCamera& camera) { cameras.emplace(camera.number, camera); });
+  calibration::each_colmap_camera(file, [&](const ColmapCamera& camera) {
+    const bool is_new = cameras.emplace(camera.number, camera).second;
+    if (!is_new) refuse_two(file, "cameras", camera.number);
+  });
   return cameras;
 }
 
 std::vector<ColmapImage> images_of(const fs::path& file) {
   std::vector<ColmapImage> images;
-  calibration::each_colmap_image(file,
-                                 [&](ColmapImage image) { images.push_back(std::move(image)); });
+  std::unordered_set<std::uint64_t> numbers;
+  calibration::each_colmap_image(file, [&](ColmapImage image) {
+    if (!numbers.insert(image.number).second) refuse_two(file, "images", image.number);
+    images.push_back(std::move(image));
+  });
   return images;
 }
 

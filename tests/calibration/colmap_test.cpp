@@ -403,6 +403,24 @@ TEST_F(Colmap, BadTextNamesFileAndLine) {
   EXPECT_NE(error().find("images.txt line 2 lacks"), std::string::npos) << error();
 }
 
+TEST_F(Colmap, SurplusParametersAreErrors) {
+  write_text("1 OPENCV_FISHEYE 640 480 200 201 320.5 240.25 0.01 -0.002 0.0003 -0.00004 0.5\n");
+  EXPECT_NE(error().find("cameras.txt line 1 has more parameters than its camera model"),
+            std::string::npos)
+      << error();
+  write_text("1 SIMPLE_PINHOLE 640 480 200 320 240 \t\r\n7 PINHOLE 640 480 200 201 320 240\n");
+  EXPECT_EQ(error(), "");
+}
+
+TEST_F(Colmap, NumbersOfCamerasAndImagesAreThereOnce) {
+  write_text(cameras_text + std::string("7 SIMPLE_RADIAL 1000 800 950 500 400 -0.1\n"));
+  EXPECT_NE(error().find("cameras.txt has two cameras of the number 7"), std::string::npos)
+      << error();
+  write_text(cameras_text, images_text + std::string("\n\n4 1 0 0 0 0 0 0 7 left/c.png\n\n"));
+  EXPECT_NE(error().find("images.txt has two images of the number 4"), std::string::npos)
+      << error();
+}
+
 TEST_F(Colmap, SizesMustBeWholeNumbersOfPixels) {
   for (const std::string size : {"1919.9 1080", "1920 0", "1920 -1e300", "1e300 1080"}) {
     const std::string message =
