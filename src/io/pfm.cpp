@@ -51,8 +51,17 @@ cv::Mat read_pfm(const std::filesystem::path& path, const std::vector<uchar>& by
   const int channels = kind == "PF" ? 3 : 1;
   const auto rows = static_cast<std::size_t>(height);
   const std::size_t row_bytes = static_cast<std::size_t>(width) * channels * sizeof(float);
-  if (bytes.size() < position || bytes.size() - position < row_bytes * rows) {
+  const std::size_t map_bytes = row_bytes * rows;
+  // The one character after the scale is two where lines end in CR LF.
+  const bool is_crlf =
+      position < bytes.size() && bytes[position - 1] == '\r' && bytes[position] == '\n';
+  if (is_crlf) ++position;
+  if (bytes.size() < position + map_bytes) {
     throw Error(path.string() + " is truncated; copy it again.");
+  }
+  if (bytes.size() > position + map_bytes) {
+    throw Error(path.string() + " has " + std::to_string(bytes.size() - position - map_bytes) +
+                " bytes more than its header says; write it again.");
   }
   cv::Mat map(static_cast<int>(height), static_cast<int>(width), CV_MAKETYPE(CV_32F, channels));
   for (std::size_t i = 0; i < rows; ++i) {

@@ -277,6 +277,23 @@ TEST(BadFiles, PfmMapsAreWholeToTheLastByte) {
   write_map(folder / "m.pfm", random_map(CV_32FC1));
   const std::string whole = bytes_of(folder / "m.pfm");
   EXPECT_THROW(read_map(folder.write("cut.pfm", whole.substr(0, whole.size() - 1))), Error);
+  EXPECT_NE(error_of([&] {
+              read_map(folder.write("more.pfm", whole + "\n"));
+            }).find("more.pfm has 1 bytes more than its header says"),
+            std::string::npos);
+}
+
+TEST(Maps, PfmHeadersMayHaveCrLf) {
+  const TemporaryFolder folder;
+  const float values[] = {1.5f, 2.5f};
+  const std::string data(reinterpret_cast<const char*>(values), sizeof values);
+  const std::string header = "Pf\r\n2 1\r\n-1.0\r\n";
+  const cv::Mat map = read_map(folder.write("m.pfm", header + data));
+  EXPECT_EQ(map.at<float>(0, 0), 1.5f);
+  EXPECT_EQ(map.at<float>(0, 1), 2.5f);
+  for (const std::string& other : {data + "\r\n", data.substr(1)}) {
+    EXPECT_THROW(read_map(folder.write("m.pfm", header + other)), Error);
+  }
 }
 
 TEST(BadFiles, PfmHeadersAreChecked) {
