@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -101,6 +102,8 @@ bool flush_standard_output() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // A file that grows beyond a limit is an error of writing, as on a full disk.
+  std::signal(SIGXFSZ, SIG_IGN);
   // What OpenCV logs and prints of broken images, the command says in a sentence.
   std::cerr.rdbuf(nullptr);
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
