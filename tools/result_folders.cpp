@@ -25,7 +25,8 @@ std::string first_difference(const Json& there, const Json& now) {
   const auto b = nlohmann::json::parse(to_text(now));
   const nlohmann::json differences = nlohmann::json::diff(a, b);
   if (differences.empty()) return "";
-  const auto path = nlohmann::json::json_pointer(differences[0]["path"].get<std::string>());
+  auto path = nlohmann::json::json_pointer(differences[0]["path"].get<std::string>());
+  if (path.back() == "-") path.pop_back();  // a list that has more at its end now
   const auto value = [&path](const nlohmann::json& settings) {
     return settings.contains(path) ? settings[path].dump() : std::string("not set");
   };

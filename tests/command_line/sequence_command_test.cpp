@@ -268,6 +268,20 @@ TEST_F(SequenceCommand, MasksAreTheSameFromEveryFolder) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
 }
 
+TEST_F(SequenceCommand, LongerListsAreOtherSettings) {
+  cv::imwrite(file("mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
+  for (const auto& [option, message] :
+       {std::pair<std::string, std::string>(
+            "--mask " + file("mask.png"),
+            "masks is [] there and [\"" + file("mask.png") + "\"] now"),
+        {"--formats tiff,pfm", "formats is [\"tiff\"] there and [\"tiff\",\"pfm\"] now"}}) {
+    const Outcome outcome = run(sequence() + option);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find(message), std::string::npos) << outcome.output;
+  }
+}
+
 TEST_F(SequenceCommand, ADatasetIsTheSameByEveryName) {
   ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
   for (const char* name : {"data/", "data/.", "data/../data//"}) {
