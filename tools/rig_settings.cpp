@@ -19,8 +19,10 @@ void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_othe
 }
 
 void RigSettings::add_fields_of_view_to(CLI::App& command) {
-  command.add_option("--mask", masks,
-                     "Image, 0 = ignore the pixel; once for all views or once for each");
+  command
+      .add_option("--mask", masks,
+                  "Image, 0 = ignore the pixel; one for all views or one for each (by comma)")
+      ->delimiter(',');
   command
       .add_option(
           "--max-theta", max_theta,
@@ -83,8 +85,9 @@ ws::CalibratedImages RigSettings::images_of(const ws::SfmModel& model,
 
 void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
   if (masks.size() > 1 && masks.size() != rig.views.size()) {
-    throw ws::Error("--mask was given " + std::to_string(masks.size()) + " times for " +
-                    std::to_string(rig.views.size()) + " views; give one for all or one for each.");
+    throw ws::Error("--mask names " + std::to_string(masks.size()) + " images for " +
+                    std::to_string(rig.views.size()) +
+                    " views; give one for all or one for each (by comma).");
   }
   std::vector<cv::Mat> read;  // one for all views stays one in memory
   for (const std::string& file : masks) {

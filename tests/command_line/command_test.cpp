@@ -205,6 +205,8 @@ TEST_F(Command, BadImagesAreNamed) {
                "is a folder; give images");
   expect_error(depth_of("left.png", "right.png") + "--mask " + file("small.png"), "mask");
   expect_error(depth_of("left.png", "right.png") + "--mask " + file("no.png"), "no.png");
+  expect_error(depth_of("left.png", "right.png") + "--mask a.png,b.png,c.png",
+               "--mask names 3 images for 2 views");
 }
 
 TEST_F(Command, BadCalibrationsAndOptionsAreNamed) {
@@ -679,7 +681,8 @@ TEST_F(Command, OptionsMayStandBeforeImages) {
   const std::string images = file("left.png") + " " + file("right.png");
   const std::string rest = " -c " + file("calib.yaml") + " -o " + file("out") + quick;
   for (const std::string& option :
-       {"--mask " + file("mask.png") + " --mask " + file("mask.png"), std::string("--views 0,1"),
+       {"--mask " + file("mask.png") + " --mask " + file("mask.png"),
+        "--mask " + file("mask.png") + "," + file("mask.png"), std::string("--views 0,1"),
         std::string("--blur 0.5,0"), std::string("--formats tiff,pfm")}) {
     const Outcome outcome = run("depth " + option + " " + images + rest);
     EXPECT_EQ(outcome.exit_code, 0) << option << "\n" << outcome.output;
