@@ -48,6 +48,8 @@ ws::Device open_device(const MatchSettings& settings) {
     if (!settings.device.pipeline_cache.empty())
       refuse_without_effect("--pipeline-cache", info, "--device vulkan");
   }
+  if (info.kind == ws::DeviceKind::cpu && settings.device.max_samples_per_dispatch > 0)
+    refuse_without_effect("--max-samples-per-dispatch", info, "a GPU");
   if (settings.asks_for_device_filter()) require_device_filter(info);
   return device;
 }

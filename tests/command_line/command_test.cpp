@@ -341,6 +341,8 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
   expect_error(depth + "--png-scale 100", "--png-scale has no effect without --formats png");
   expect_error(depth + "--validation", "--validation has no effect on CPU");
   expect_error(depth + "--pipeline-cache x", "--pipeline-cache has no effect on CPU");
+  expect_error(depth + "--max-samples-per-dispatch 1000",
+               "--max-samples-per-dispatch has no effect on CPU");
   expect_error(depth + "--filter device", "--filter device has no effect on CPU");
   expect_refusal(depth + "--warm-iterations 3", "--warm-iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
