@@ -74,12 +74,19 @@ void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images)
   }
 }
 
+void report_few_sources(const ws::Options& options, std::size_t views) {
+  if (static_cast<std::size_t>(options.best_sources) < views) return;
+  say("--best-sources " + std::to_string(options.best_sources) + " is more than the other views, " +
+      std::to_string(views - 1) + "; costs are means over all of them.");
+}
+
 MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
                          const std::vector<cv::Mat>& images, const std::string& output) {
   MatchingRun run;
   run.options = settings.options();
   ws::Device device = open_device(settings);
   run.device = device.info();
+  report_few_sources(run.options, rig.views.size());
   ws::Matcher matcher(device, rig, run.options);
   report_blank_images(rig, images);
   ws::prepare_output_folder(output);

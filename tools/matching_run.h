@@ -39,6 +39,9 @@ void require_no_validation_messages(const widestereo::Device& device);
 /// camera that failed.
 void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
 
+/// Says, on standard error, where costs cannot be means over as many sources as asked for.
+void report_few_sources(const widestereo::Options& options, std::size_t views);
+
 /// Throws Error also when validation was asked for and reported anything. Once nothing else can be
 /// wrong with the request, and before the work, the output folder is prepared and locked.
 MatchingRun match_images(const MatchSettings& settings, const widestereo::Rig& rig,

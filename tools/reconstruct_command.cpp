@@ -146,6 +146,10 @@ class Reconstruction {
                    "widestereo: %zu of %zu images see nothing that others see and are left out.\n",
                    alone, images_.views.size());
     }
+    const auto largest =
+        std::max_element(groups_.begin(), groups_.end(),
+                         [](const Images& a, const Images& b) { return a.size() < b.size(); });
+    report_few_sources(options_.front(), largest->size());
     keep_results();
     ProgressBar bar("Matching on " + device_.info().name);
     for (std::size_t i = 0; i < groups_.size(); ++i) match(i, bar);

@@ -176,6 +176,7 @@ class SequenceRun {
     const std::size_t finished = folder_.finished(wanted);
     remaining_ = selection_.frames.size() - finished;
     if (remaining_ == 0) return;
+    report_few_sources(options_, selection_.rig.views.size());
     ws::Matcher matcher(device_, selection_.rig, options_);
     if (finished > 0) take_up(finished - 1);
     for (std::size_t i = finished; i < selection_.frames.size(); ++i) match(matcher, i);

@@ -503,6 +503,16 @@ TEST_F(Command, ImagesWithoutOverlapAreRefused) {
   expect_error(depth_of("left.png", "right.png", "apart.yaml"), "do not overlap");
 }
 
+TEST_F(Command, MoreSourcesThanThereAreIsSaid) {
+  const Outcome outcome = run(depth_of("left.png", "right.png") + "--best-sources 2");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("--best-sources 2 is more than the other views, 1; costs"),
+            std::string::npos)
+      << outcome.output;
+  const Outcome fits = run(depth_of("left.png", "right.png") + "--best-sources 1");
+  EXPECT_EQ(fits.output.find("--best-sources"), std::string::npos) << fits.output;
+}
+
 TEST_F(Command, WithoutAGpuItSaysSoAndUsesTheCpu) {
   const std::string no_driver =
       "VK_ICD_FILENAMES=/nonexistent.json VK_DRIVER_FILES=/nonexistent.json CUDA_VISIBLE_DEVICES=";
