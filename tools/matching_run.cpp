@@ -74,6 +74,16 @@ void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images)
   }
 }
 
+void report_views_without_overlap(const ws::Rig& rig, const ws::StereoResult& result) {
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    const cv::Mat alone = result.views[i].reasons & (ws::reason_no_ray | ws::reason_no_overlap);
+    if (cv::countNonZero(alone) < static_cast<int>(alone.total())) continue;
+    say("no pixel of " + rig.views[i].name +
+        " is seen by another view within the distance range; check its calibration and mask, or "
+        "leave it out.");
+  }
+}
+
 void report_few_sources(const ws::Options& options, std::size_t views) {
   if (static_cast<std::size_t>(options.best_sources) < views) return;
   say("--best-sources " + std::to_string(options.best_sources) + " is more than the other views, " +
@@ -96,5 +106,6 @@ MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
     run.result = matcher.match(images, [&bar](double share) { bar.show(share); });
   }
   require_no_validation_messages(device);
+  report_views_without_overlap(rig, run.result);
   return run;
 }

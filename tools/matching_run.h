@@ -39,6 +39,10 @@ void require_no_validation_messages(const widestereo::Device& device);
 /// camera that failed.
 void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
 
+/// Says, on standard error, which views see nothing that another one does.
+void report_views_without_overlap(const widestereo::Rig& rig,
+                                  const widestereo::StereoResult& result);
+
 /// Says, on standard error, where costs cannot be means over as many sources as asked for.
 void report_few_sources(const widestereo::Options& options, std::size_t views);
 

@@ -209,6 +209,7 @@ class Reconstruction {
     ws::Matcher matcher(device_, rig, run.options);
     run.result = matcher.match(pixels, bar.part(number, count));
     require_no_validation_messages(device_);
+    report_views_without_overlap(rig, run.result);
     for (std::size_t i = 0; i < group.size(); ++i) {
       if (!is_matched(group[i])) write(group, i, pixels[i], run);
     }

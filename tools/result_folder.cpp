@@ -2,6 +2,7 @@
 #include "result_folder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -364,6 +365,13 @@ Json write_result_folder(const fs::path& folder, const FolderContents& contents,
   return record;
 }
 
+std::string cost_text(double cost) {
+  if (std::isnan(cost)) return "-";
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), "%.3f", cost);
+  return text.data();
+}
+
 void report(const Json& record, const fs::path& folder, bool as_json) {
   if (as_json) {
     std::cout << to_text(record) << "\n";
@@ -376,10 +384,11 @@ void report(const Json& record, const fs::path& folder, bool as_json) {
               record["options"]["preset"].get<std::string>().c_str());
   for (const auto& view : record["views"]) {
     std::printf(
-        "%s: %.1f %% accepted, mean cost %.3f, cost < 0.2 %.1f %% (%.1f %% of textured pixels, "
+        "%s: %.1f %% accepted, mean cost %s, cost < 0.2 %.1f %% (%.1f %% of textured pixels, "
         "%.1f %% of those accepted), left-right within 2 %% %.1f %%, within 2 px %.1f %%\n",
         view["name"].get<std::string>().c_str(), 100 * view["accepted"].get<double>(),
-        view["mean_cost"].get<double>(), 100 * view["cost_below_0.2"].get<double>(),
+        cost_text(view["mean_cost"].get<double>()).c_str(),
+        100 * view["cost_below_0.2"].get<double>(),
         100 * view["cost_below_0.2_textured"].get<double>(),
         100 * view["cost_below_0.2_textured_accepted"].get<double>(),
         100 * view["consistent_within_2_percent"].get<double>(),

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <vector>
 
 #include "matching_run.h"
@@ -76,6 +77,9 @@ std::vector<std::string> files_of(const nlohmann::ordered_json& record);
 nlohmann::ordered_json write_result_folder(const std::filesystem::path& folder,
                                            const FolderContents& contents,
                                            const FolderFormat& format);
+
+/// Of a mean cost: "-" where no pixel has a plane.
+std::string cost_text(double cost);
 
 /// Prints the record, or a summary of it for people.
 void report(const nlohmann::ordered_json& record, const std::filesystem::path& folder,

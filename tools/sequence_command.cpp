@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -146,15 +147,19 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
 /// How well a frame was matched, over all its views.
 struct Quality {
   double accepted = 0;
-  double mean_cost = 0;
+  double mean_cost = 0;  ///< NaN where no view has a plane
 };
 
 Quality quality_of(const ws::StereoResult& result) {
   Quality quality{.accepted = accepted_share(result.views)};
-  const auto views = static_cast<double>(result.views.size());
+  double views = 0;
   for (const ws::ViewResult& view : result.views) {
-    quality.mean_cost += ws::consistency_scores(view.differences, view.cost).mean_cost / views;
+    const double mean_cost = ws::consistency_scores(view.differences, view.cost).mean_cost;
+    if (std::isnan(mean_cost)) continue;
+    quality.mean_cost += mean_cost;
+    ++views;
   }
+  quality.mean_cost /= views;
   return quality;
 }
 
@@ -233,7 +238,7 @@ class SequenceRun {
 
   void note_cold(const Json& record) {
     if (record["start"] == "warm" || !is_of_use(record)) return;
-    cold_ = {record["accepted"].get<double>(), record["mean_cost"].get<double>()};
+    accepted_of_cold_ = record["accepted"].get<double>();
   }
 
   void match(ws::Matcher& matcher, std::size_t index) {
@@ -292,7 +297,7 @@ class SequenceRun {
 
   /// Than the last cold frame: what is seen is another scene, or the planes went astray.
   bool is_worse(const Quality& quality) const {
-    return quality.accepted < arguments_.restart_below * cold_.accepted;
+    return quality.accepted < arguments_.restart_below * accepted_of_cold_;
   }
 
   void write(std::size_t index, const std::vector<cv::Mat>& images, const Frame& frame) {
@@ -320,11 +325,11 @@ class SequenceRun {
       return record;
     });
     if (arguments_.as_json || bar_.visible()) return;
-    std::printf("%s: %s%s%s, %.2f s, %.1f %% accepted, mean cost %.3f (%zu of %zu)\n",
+    std::printf("%s: %s%s%s, %.2f s, %.1f %% accepted, mean cost %s (%zu of %zu)\n",
                 source.name.c_str(), frame.start.c_str(), frame.motion.empty() ? "" : ", motion ",
                 frame.motion.c_str(), (result.milliseconds + frame.motion_milliseconds) / 1000,
-                100 * quality.accepted, quality.mean_cost, folder_.frames().size(),
-                selection_.frames.size());
+                100 * quality.accepted, cost_text(quality.mean_cost).c_str(),
+                folder_.frames().size(), selection_.frames.size());
     std::fflush(stdout);
   }
 
@@ -335,7 +340,7 @@ class SequenceRun {
   SequenceFolder folder_;
   ProgressBar bar_;
   Previous previous_;
-  Quality cold_;
+  double accepted_of_cold_ = 0;
   std::size_t remaining_ = 0;
   std::size_t matched_ = 0;
 };

@@ -41,8 +41,7 @@ SequenceFolder::SequenceFolder(fs::path folder, const Json& settings, bool overw
                {.name = ResultFolders::sequence,
                 .results = "frames",
                 .texts = {"start", "motion"},
-                .numbers = {"milliseconds", "motion_milliseconds", "patch_samples", "accepted",
-                            "mean_cost"}},
+                .numbers = {"milliseconds", "motion_milliseconds", "patch_samples", "accepted"}},
                settings, overwrite) {}
 
 std::size_t SequenceFolder::finished(const std::vector<Json>& wanted) {

@@ -101,7 +101,7 @@ struct ConsistencyScores {
   double consistent_pixels = 0;    ///< left-right displacement at most 2 px
   double low_cost = 0;             ///< cost 1 - ZNCC below 0.2
   double low_cost_textured = 0;    ///< the same, of the textured pixels with a plane
-  double mean_cost = 0;
+  double mean_cost = 0;            ///< NaN where no pixel has a plane
   long pixels = 0;
   long textured = 0;  ///< of these
 };

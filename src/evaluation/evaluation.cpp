@@ -371,7 +371,7 @@ ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& 
     }
   }
   const double n = static_cast<double>(std::max(scores.pixels, 1L));
-  scores.mean_cost /= n;
+  scores.mean_cost = scores.pixels == 0 ? unknown : scores.mean_cost / n;
   scores.low_cost /= n;
   scores.low_cost_textured /= static_cast<double>(std::max(scores.textured, 1L));
   scores.consistent_relative /= n;

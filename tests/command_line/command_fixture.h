@@ -122,6 +122,23 @@ cam1:
     folder_.write("imucam.yaml", text);
   }
 
+  /// Writes backwards.yaml: calib.yaml with narrow lenses and a cam2 that looks the other way.
+  void write_calibration_looking_backwards() {
+    const std::string narrow = "  max_theta_deg: 40\n";
+    const std::string wide = "  max_theta_deg: 97.5\n";
+    std::string text = bytes_of("calib.yaml") + narrow;
+    text.replace(text.find(wide), wide.size(), narrow);
+    text += R"(cam2:
+  T_cn_cnm1: [[-1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]
+  camera_model: ds
+  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
+  distortion_model: none
+  distortion_coeffs: []
+  resolution: [96, 96]
+)";
+    folder_.write("backwards.yaml", text + narrow);
+  }
+
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   /// Of a file in the folder, or of any by its whole path.
   std::string bytes_of(const std::string& name) const { return test::bytes_of(folder_ / name); }

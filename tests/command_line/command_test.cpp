@@ -503,6 +503,22 @@ TEST_F(Command, ImagesWithoutOverlapAreRefused) {
   expect_error(depth_of("left.png", "right.png", "apart.yaml"), "do not overlap");
 }
 
+TEST_F(Command, ViewsThatNoOtherOverlapsAreNamed) {
+  write_calibration_looking_backwards();
+  const Outcome outcome =
+      run("depth " + file("left.png") + " " + file("right.png") + " " + file("left.png") + " -c " +
+          file("backwards.yaml") + " -o " + file("out") + quick);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("no pixel of cam2 is seen by another view"), std::string::npos)
+      << outcome.output;
+  EXPECT_EQ(outcome.output.find("no pixel of cam1"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("cam2: 0.0 % accepted, mean cost -, cost"), std::string::npos)
+      << outcome.output;
+  const nlohmann::json views = nlohmann::json::parse(bytes_of("out/result.json")).at("views");
+  EXPECT_TRUE(views[2].at("mean_cost").is_null()) << views[2];
+  EXPECT_TRUE(views[1].at("mean_cost").is_number()) << views[1];
+}
+
 TEST_F(Command, MoreSourcesThanThereAreIsSaid) {
   const Outcome outcome = run(depth_of("left.png", "right.png") + "--best-sources 2");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;

@@ -325,6 +325,22 @@ TEST_F(SequenceCommand, ASceneCutIsNoticedWhereARunWasResumed) {
   EXPECT_EQ(record()["frames"][2]["start"], "cold after warm") << record()["frames"];
 }
 
+TEST_F(SequenceCommand, ViewsWithoutPlanesHaveNoPartInTheMeanCost) {
+  write_calibration_looking_backwards();
+  fs::copy(folder_ / "data/cam0", folder_ / "data/cam2");
+  const std::string sequence = "sequence " + file("data") + " -c " + file("backwards.yaml") +
+                               " -o " + file("out") + " --views 0,1,2 --count ";
+  for (const char* count : {"1", "2"}) {
+    const Outcome outcome = run(sequence + count + quick);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  }
+  const nlohmann::json views = nlohmann::json::parse(bytes_of("out/001/result.json")).at("views");
+  EXPECT_TRUE(views.at(2).at("mean_cost").is_null()) << views.at(2);
+  const double of_others =
+      (views.at(0).at("mean_cost").get<double>() + views.at(1).at("mean_cost").get<double>()) / 2;
+  EXPECT_NEAR(record()["frames"][1].at("mean_cost").get<double>(), of_others, 1e-9);
+}
+
 TEST_F(SequenceCommand, BlackFramesNeitherStartOthersNorHideSceneCuts) {
   const cv::Mat black(96, 96, CV_8UC1, cv::Scalar(0));
   for (const char* image : {"cam0/000.png", "cam1/000.png", "cam1/002.png"}) {

@@ -343,6 +343,10 @@ TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   EXPECT_NEAR(s.consistent_pixels, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.low_cost, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.mean_cost, 0.5 / 3, 1e-6);
+  const ConsistencyScores of_none =
+      consistency_scores(differences, cv::Mat(1, 4, CV_32FC1, cv::Scalar(2)));
+  EXPECT_EQ(of_none.pixels, 0);
+  EXPECT_TRUE(std::isnan(of_none.mean_cost)) << of_none.mean_cost;
 }
 
 TEST(Evaluation, MapsThatDoNotFitAreNamed) {
