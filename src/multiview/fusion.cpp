@@ -12,6 +12,7 @@
 
 #include "geometry/angle.h"
 #include "geometry/distance.h"
+#include "geometry/validation.h"
 #include "io/point_cloud.h"
 #include "widestereo/error.h"
 
@@ -375,11 +376,7 @@ PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<st
                 ".");
   }
   for (const std::vector<std::size_t>& list : others) {
-    for (const std::size_t other : list) {
-      if (other < views.size()) continue;
-      throw Error("There is no view " + std::to_string(other) + " among the " +
-                  std::to_string(views.size()) + " to be fused; count from 0.");
-    }
+    for (const std::size_t other : list) require_number(other, views.size(), "view", "The fusion");
   }
   if (views.empty()) return {};
   std::vector<std::vector<std::size_t>> distinct;

@@ -444,7 +444,7 @@ TEST_F(Fusion, MapsThatDoNotFitAreNamed) {
             std::string::npos);
   EXPECT_NE(test::error_of([this] {
               fuse(views_, {{1}, {3}, {}}, [this](std::size_t i) { return maps_[i]; });
-            }).find("no view 3"),
+            }).find("no view number 3 among its 3"),
             std::string::npos);
 }
 
