@@ -257,6 +257,39 @@ TEST_F(Fusion, CoarsePointsDoNotStandForFinePixels) {
   EXPECT_GT(10 * both, 8 * fine);
 }
 
+/// What a view passes on of a wall is as fine as the finest point that its pixels are part of.
+TEST_F(Fusion, PixelsOfACoarseAndAFinePointStandForTheFineOne) {
+  Rig rig;
+  for (const double distance : {2.0, 1.8, 1.55, 1.55}) {
+    rig.views.push_back(views_[0]);
+    rig.views.back().world_from_camera = Eigen::Translation3d(0, 0, 2 - distance);
+  }
+  const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
+  const auto points_ahead = [&scene](std::size_t count) {
+    // The second view takes over the points of the first one, and joins finer ones of the third.
+    std::vector<std::vector<std::size_t>> others = {{}, {0}, {1}, {1}};
+    others.resize(count);
+    FusionOptions options;
+    options.min_views = 1;
+    const PointCloud cloud = fuse(
+        {scene.rig.views.begin(), scene.rig.views.begin() + static_cast<std::ptrdiff_t>(count)},
+        others,
+        [&scene](std::size_t i) {
+          return ViewMaps{.distance = scene.views[i].truth.distance,
+                          .normals = {},
+                          .image = {},
+                          .confidence = {}};
+        },
+        options);
+    return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
+      return point.position.head<2>().norm() < 0.5F;
+    });
+  };
+  EXPECT_EQ(points_ahead(2), points_ahead(1));
+  EXPECT_GT(points_ahead(3), points_ahead(2));
+  EXPECT_EQ(points_ahead(4), points_ahead(3)) << "which the fourth sees as finely";
+}
+
 TEST_F(Fusion, NoiseIsAveraged) {
   cv::RNG random(3);
   for (ViewMaps& maps : maps_) {

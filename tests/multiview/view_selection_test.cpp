@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <set>
@@ -103,6 +104,29 @@ TEST(AssumedPoints, AreListedForAFewViewsThatSuit) {
   EXPECT_EQ(last, 1);
   // By the points on their own rays, at least.
   EXPECT_GE(*std::min_element(listed.begin(), listed.end()), 4 * 4 * 4U);
+}
+
+TEST(AssumedPoints, AreListedForTheirOwnViewAndOthersOfManyBaselines) {
+  std::vector<View> views;
+  for (int i = 0; i < 200; ++i) views.push_back(view_at(0.01 * i));
+  const std::vector<ObservedPoint> points = assumed_points(views, 3.3, 3.5);
+  constexpr std::size_t of_view = 4 * 4 * 4;
+  ASSERT_EQ(points.size(), views.size() * of_view);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_TRUE(std::ranges::binary_search(points[i].observers, i / of_view)) << i;
+  }
+  std::set<long> centimetres;
+  constexpr long middle = 75;
+  for (std::size_t i = 0; i < of_view; ++i) {
+    for (const std::size_t observer : points[middle * of_view + i].observers) {
+      const long away = std::abs(static_cast<long>(observer) - middle);
+      if (away > 0) centimetres.insert(away);
+    }
+  }
+  // The best 63 are less far away.
+  EXPECT_GT(*centimetres.begin(), 20) << "whose angles tell little";
+  EXPECT_GT(*centimetres.rbegin(), 75);
+  EXPECT_LT(*centimetres.rbegin(), 100);
 }
 
 /// The nearest ones tell no distances.
