@@ -15,7 +15,6 @@
 #include "device_fixture.h"
 #include "match_fixture.h"
 #include "same_bits.h"
-#include "schedule/bands.h"
 #include "vulkan/physical_device.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"
@@ -692,80 +691,6 @@ TEST_F(VulkanCache, OtherFilesAreNeitherReadNorReplaced) {
 TEST_F(VulkanCache, UnwritablePathIsAnError) {
   path_ = folder_ / "missing folder" / "pipelines.bin";
   EXPECT_THAT(error_of([this] { match_with_cache(); }), HasSubstr("missing folder"));
-}
-
-TEST(Bands, CoverEveryRowOnceAndAddUp) {
-  const Schedule schedule = small_match().schedule();
-  for (const long long limit : {1LL, 999LL, 30000LL, 100000000LL}) {
-    const std::vector<Band> bands = split_into_bands(schedule, limit);
-    std::size_t next = 0;
-    for (const Dispatch& dispatch : schedule.dispatches) {
-      long long samples = 0;
-      int row = 0;
-      while (row < dispatch.height) {
-        ASSERT_LT(next, bands.size());
-        const Band& band = bands[next++];
-        ASSERT_EQ(band.dispatch, &dispatch);
-        ASSERT_EQ(band.first_row, row);
-        ASSERT_GT(band.last_row, row);
-        EXPECT_TRUE(band.work <= limit || band.last_row == row + 1);
-        samples += band.samples;
-        row = band.last_row;
-      }
-      EXPECT_EQ(row, dispatch.height);
-      EXPECT_EQ(samples, dispatch.samples);
-    }
-    EXPECT_EQ(next, bands.size());
-  }
-}
-
-TEST(Bands, AreGroupedWithinLimits) {
-  const Schedule schedule = small_match().schedule();
-  const std::vector<Band> bands = split_into_bands(schedule, 1000);
-  const auto groups = group_for_submission(bands, 5000, 3);
-  const Band* next = bands.data();
-  for (const auto group : groups) {
-    ASSERT_FALSE(group.empty());
-    EXPECT_EQ(group.data(), next);
-    EXPECT_LE(group.size(), 3u);
-    long long work = 0;
-    for (const Band& band : group) work += band.work;
-    EXPECT_TRUE(work <= 5000 || group.size() == 1);
-    next = group.data() + group.size();
-  }
-  EXPECT_EQ(next, bands.data() + bands.size());
-  EXPECT_TRUE(group_for_submission({}, 1, 1).empty());
-}
-
-TEST(Bands, AreSharedOutEvenly) {
-  const Schedule schedule = small_match().schedule();
-  const std::vector<Band> bands = split_into_bands(schedule, 1000);
-  long long total = 0;
-  long long largest = 0;
-  for (const Band& band : bands) {
-    total += band.work;
-    largest = std::max(largest, band.work);
-  }
-  for (const std::size_t count : {1u, 3u, 10u}) {
-    const auto shares = share_out(bands, count);
-    ASSERT_EQ(shares.size(), count);
-    const Band* next = bands.data();
-    for (const auto share : shares) {
-      EXPECT_EQ(share.data(), next);
-      next = share.data() + share.size();
-      long long work = 0;
-      for (const Band& band : share) work += band.work;
-      EXPECT_NEAR(static_cast<double>(work),
-                  static_cast<double>(total) / static_cast<double>(count),
-                  static_cast<double>(largest));
-    }
-    EXPECT_EQ(next, bands.data() + bands.size());
-  }
-  const auto more_than_bands = share_out({bands.data(), 2}, 5);
-  ASSERT_EQ(more_than_bands.size(), 5u);
-  std::size_t shared = 0;
-  for (const auto share : more_than_bands) shared += share.size();
-  EXPECT_EQ(shared, 2u);
 }
 
 }  // namespace
