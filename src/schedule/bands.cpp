@@ -55,6 +55,11 @@ long long estimated_work(const Dispatch& dispatch, const KernelConstants& consta
   }
 }
 
+/// total * rows / height, whose product may be more than the type holds.
+long long share_of(long long total, long long rows, long long height) {
+  return total / height * rows + total % height * rows / height;
+}
+
 }  // namespace
 
 std::vector<Band> split_into_bands(const Schedule& schedule, long long max_work) {
@@ -69,7 +74,7 @@ std::vector<Band> split_into_bands(const Schedule& schedule, long long max_work)
       const long long last = std::min(first + rows, height);
       // Differences of running totals, so that the parts add up to the whole.
       const auto part = [&](long long total) {
-        return total * last / height - total * first / height;
+        return share_of(total, last, height) - share_of(total, first, height);
       };
       bands.push_back({&dispatch, static_cast<int>(first), static_cast<int>(last),
                        part(dispatch.samples), part(work)});

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <vector>
 
 #include "kernel_fixture.h"
@@ -95,6 +96,25 @@ TEST(Bands, AreSharedOutEvenly) {
   std::size_t shared = 0;
   for (const auto share : more_than_bands) shared += share.size();
   EXPECT_EQ(shared, 2u);
+}
+
+TEST(Bands, OfTheMostWorkAddUp) {
+  Options options = Options::preset_named("fast");
+  options.pattern = PatchPattern::dense;
+  options.window_radius = 15;
+  options.sweep_steps = 10000;
+  options.levels = 1;
+  options.level_iterations = options.level_regressions = {1};
+  const Schedule schedule = make_schedule(fisheye_rig(8192), options);
+  std::map<const Dispatch*, long long> samples;
+  for (const Band& band : split_into_bands(schedule, 1LL << 40)) {
+    EXPECT_GE(band.samples, 0);
+    EXPECT_GE(band.work, band.samples);
+    samples[band.dispatch] += band.samples;
+  }
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    EXPECT_EQ(samples[&dispatch], dispatch.samples) << to_string(dispatch.kernel);
+  }
 }
 
 }  // namespace
