@@ -380,6 +380,7 @@ bool share_field_of_view(const View& first, const View& second) {
 }
 
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs, bool intrinsics) {
+  validate(rig, "The rig to be refined");
   if (pairs.empty()) throw Error("A rig cannot be refined without matches between its views.");
   for (const ViewMatches& pair : pairs) {
     if (pair.first < rig.views.size() && pair.second < rig.views.size() &&

@@ -229,6 +229,19 @@ TEST(RigRefinement, BadInputHasOneSentence) {
   EXPECT_NE(test::error_of([&] { refine_rig(rig, matches); }).find("Only 7 features"),
             std::string::npos);
   EXPECT_THROW(refine_rig(rig, {}), Error);
+  Rig of_one_centre = rig;
+  of_one_centre.views[2].world_from_camera.translation() =
+      rig.views[0].world_from_camera.translation();
+  EXPECT_NE(test::error_of([&] {
+              refine_rig(of_one_centre, matches_of(rig, {}));
+            }).find("cam0 and cam2 have the same centre"),
+            std::string::npos);
+  Rig without_focal_length = rig;
+  without_focal_length.views[1].camera.fx = 0;
+  EXPECT_NE(test::error_of([&] {
+              refine_rig(without_focal_length, matches_of(rig, {}));
+            }).find("cam1: fx is 0"),
+            std::string::npos);
   // Images that do not belong together.
   const std::vector<ViewMatches> unrelated = matches_of(rig, {.false_matches = 0.95});
   EXPECT_NE(test::error_of([&] { refine_rig(rig, unrelated); }).find("contradict"),
