@@ -8,6 +8,7 @@
 
 #include "calibration/formats.h"
 #include "geometry/angle.h"
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -107,11 +108,10 @@ Camera read_camera(const Document& document, const Json& entry) {
 
 Eigen::Isometry3d read_pose(const Document& document, const Json& entry) {
   const auto value = [&](const char* key) { return number(document, entry, key); };
-  const Eigen::Quaterniond q(value("qw"), value("qx"), value("qy"), value("qz"));
-  if (std::abs(q.norm() - 1) > 1e-3) {
-    document.fail("A quaternion of \"T_imu_cam\" does not have length 1.");
-  }
-  return rigid(document, "T_imu_cam", q.normalized().toRotationMatrix(),
+  const Eigen::Quaterniond rotation =
+      require_unit({value("qw"), value("qx"), value("qy"), value("qz")},
+                   document.path.string() + ": T_imu_cam", "scale qx, qy, qz and qw alike");
+  return rigid(document, "T_imu_cam", rotation.toRotationMatrix(),
                {value("px"), value("py"), value("pz")});
 }
 

@@ -59,7 +59,7 @@ namespace {
 /// lenses whose images shrink outwards, as wide ones do.
 void set_division(Camera& camera, double k, const std::string& name) {
   if (k > 0) {
-    throw Error(name + ": The camera model has the division coefficient " + std::to_string(k) +
+    throw Error(name + ": The camera model has the division coefficient " + text_of(k) +
                 "; only those of wide lenses, 0 and less, are supported.");
   }
   camera.alpha = 0.5;

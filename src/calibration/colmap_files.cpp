@@ -3,12 +3,12 @@
 
 #include <array>
 #include <bit>
-#include <cmath>
 #include <fstream>
 #include <locale>
 #include <span>
 #include <sstream>
 
+#include "geometry/validation.h"
 #include "text/byte_order_mark.h"
 #include "widestereo/error.h"
 
@@ -39,11 +39,8 @@ std::ifstream open(const fs::path& path) {
 
 Eigen::Isometry3d pose_of(std::span<const double, 7> v, const std::string& where) {
   const Eigen::Quaterniond rotation(v[0], v[1], v[2], v[3]);
-  if (!(std::abs(rotation.norm() - 1) <= 1e-2)) {
-    throw Error(where + " has a quaternion of length " + std::to_string(rotation.norm()) +
-                " instead of 1.");
-  }
-  return Eigen::Translation3d(v[4], v[5], v[6]) * rotation.normalized();
+  return Eigen::Translation3d(v[4], v[5], v[6]) *
+         require_unit(rotation, where, "a pose is \"qw qx qy qz tx ty tz\"");
 }
 
 /// A .txt file of a model.

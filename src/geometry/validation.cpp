@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/rig.h"
 
@@ -95,6 +96,14 @@ void validate(const Camera& c, const std::string& name) {
       throw Error(name + ": the camera model number " + std::to_string(static_cast<int>(c.model)) +
                   " is unknown.");
   }
+}
+
+Eigen::Quaterniond require_unit(const Eigen::Quaterniond& quaternion, const std::string& name,
+                                const std::string& remedy) {
+  const double length = quaternion.norm();
+  if (std::abs(length - 1) <= 1e-2) return quaternion.normalized();
+  throw Error(name + " has a quaternion of length " + text_of(static_cast<float>(length)) +
+              " instead of 1; " + remedy + ".");
 }
 
 void require_number(std::size_t number, std::size_t count, const std::string& name,

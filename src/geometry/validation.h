@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
@@ -14,6 +14,12 @@ inline constexpr int largest_image_side = 16384;
 
 /// Whether a matrix is a rotation, but for entries rounded to four digits.
 bool is_rotation(const Eigen::Matrix3d& matrix);
+
+/// The unit quaternion that one read from a file is, but for rounding. Throws Error where its
+/// length is not 1 within 1 %. `name`, what has it, begins the message, and `remedy` ends it: a
+/// clause.
+Eigen::Quaterniond require_unit(const Eigen::Quaterniond& quaternion, const std::string& name,
+                                const std::string& remedy);
 
 /// Throws Error unless `number` is that of one of `count` things called `name` ("view"), numbered
 /// from 0. `of`, what has them, begins the message.

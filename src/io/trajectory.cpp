@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 
+#include "geometry/validation.h"
 #include "io/frame_times.h"
 #include "text/byte_order_mark.h"
 #include "text/number.h"
@@ -77,13 +78,10 @@ class PoseLine {
     const Eigen::Quaterniond rotation = comma_separated_
                                             ? Eigen::Quaterniond(v[4], v[5], v[6], v[7])
                                             : Eigen::Quaterniond(v[7], v[4], v[5], v[6]);
-    if (std::abs(rotation.norm() - 1) > 1e-2) {
-      throw Error(where + " has a quaternion of length " + std::to_string(rotation.norm()) +
-                  " instead of 1; a pose is " + form_ + ".");
-    }
     StampedPose pose;
     pose.seconds = comma_separated_ ? seconds(words[0], where) : v[0];
-    pose.world_from_body = Eigen::Translation3d(v[1], v[2], v[3]) * rotation.normalized();
+    pose.world_from_body = Eigen::Translation3d(v[1], v[2], v[3]) *
+                           require_unit(rotation, where, "a pose is " + form_);
     return pose;
   }
 
@@ -214,8 +212,8 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
       --nearest;
     }
     if (!(apart(*nearest) <= tolerance)) {
-      throw Error(name + " has no pose within " + std::to_string(tolerance) + " s of the frame " +
-                  frame.name + " (the nearest is " + std::to_string(apart(*nearest)) +
+      throw Error(name + " has no pose within " + text_of(tolerance) + " s of the frame " +
+                  frame.name + " (the nearest is " + text_of(static_cast<float>(apart(*nearest))) +
                   " s away); check the clocks, choose frames or raise the tolerance.");
     }
     poses.push_back(nearest->world_from_body);

@@ -835,7 +835,8 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect(replaced(basalt_text, "\"ucm\"", "\"ocam\""), "ocam");
   expect(replaced(basalt_text, "\"alpha\": 0.6", "\"alpha\": 1.0"), "alpha");
   expect(replaced(basalt_text, "\"fx\": 120.0", "\"fx\": \"120\""), "fx");
-  expect(replaced(basalt_text, "\"qw\": 1.0", "\"qw\": 2.0"), "quaternion");
+  expect(replaced(basalt_text, "\"qw\": 1.0", "\"qw\": 2.0"),
+         "T_imu_cam has a quaternion of length 2 instead of 1; scale qx, qy, qz and qw alike.");
   expect(replaced(basalt_text, "[512, 510], ", ""), "length");
   expect(replaced(opencv_text, "K1:", "A1:"), "K1");
   expect(replaced(opencv_text, "T: !!", "U: !!"), "translation");

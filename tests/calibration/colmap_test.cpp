@@ -398,7 +398,10 @@ TEST_F(Colmap, BadTextNamesFileAndLine) {
   write_text(cameras_text, "3 1 0 0 0 0 0 1\n\n");
   EXPECT_NE(error().find("images.txt line 1 lacks"), std::string::npos) << error();
   write_text(cameras_text, "3 1 1 0 0 0 0 1 1 left/a b.png\n\n");
-  EXPECT_NE(error().find("quaternion of length 1.41"), std::string::npos) << error();
+  EXPECT_NE(error().find("images.txt line 1 has a quaternion of length 1.414"), std::string::npos)
+      << error();
+  EXPECT_NE(error().find("instead of 1; a pose is \"qw qx qy qz tx ty tz\"."), std::string::npos)
+      << error();
   write_text(cameras_text, "3 1 0 0 0 0 0 1 1 left/a b.png\n1 2 nan\n");
   EXPECT_NE(error().find("images.txt line 2 lacks"), std::string::npos) << error();
 }

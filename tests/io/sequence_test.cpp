@@ -378,6 +378,8 @@ TEST_F(Trajectories, BrokenLinesOfGroundTruthAreNamed) {
   expect(whole + "1 2 3 4 0 0 0 1\n", "line 3 has 1 numbers instead of 9");
   expect("1,2,3,4,0,0,0,0\n", "line 1 has a quaternion of length 0");
   expect("1,2,3,4,1,1,0,0\n", "quaternion of length 1.4");
+  expect("1,2,3,4,0,0,0,1e-9\n",
+         "line 1 has a quaternion of length 1e-09 instead of 1; a pose is \"nanoseconds,px");
   expect("#t,x,y,z,q_x [],q_y [],q_z [],q_w []\n1,2,3,4,0,0,0,1\n", "write qw,qx,qy,qz");
   expect("1403636579.76,2,3,4,1,0,0,0\n", "the time 1403636579.76, which is no whole number");
   expect("1.4e18,2,3,4,1,0,0,0\n", "nanoseconds");
