@@ -1,23 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 #include "evaluation/ground_truth.h"
 #include "geometry/distance.h"
+#include "text/formatted.h"
 #include "widestereo/evaluation.h"
 
 namespace widestereo {
 namespace {
-
-template <class... Values>
-std::string formatted(const char* format, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
-}
 
 /// A number of a table, "-" where there is none.
 std::string cell(const char* format, double value) {

@@ -2,7 +2,6 @@
 #include "widestereo/view_synthesis.h"
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -10,6 +9,7 @@
 
 #include "geometry/distance.h"
 #include "geometry/validation.h"
+#include "text/formatted.h"
 
 namespace widestereo {
 namespace {
@@ -130,13 +130,10 @@ SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
 }
 
 std::string to_table(const SynthesisScores& s) {
-  char line[256];
-  std::snprintf(line, sizeof line,
-                "visible %.1f %% of the distances; ZNCC of %ld textured windows: mean %.3f, above "
-                "0.7 %.1f %%, above 0.8 %.1f %%, above 0.9 %.1f %%\n",
-                100 * s.visible, s.windows, s.mean, 100 * s.above_0_7, 100 * s.above_0_8,
-                100 * s.above_0_9);
-  return line;
+  return formatted(
+      "visible %.1f %% of the distances; ZNCC of %ld textured windows: mean %.3f, above "
+      "0.7 %.1f %%, above 0.8 %.1f %%, above 0.9 %.1f %%\n",
+      100 * s.visible, s.windows, s.mean, 100 * s.above_0_7, 100 * s.above_0_8, 100 * s.above_0_9);
 }
 
 std::string to_json(const SynthesisScores& s) {
