@@ -5,6 +5,7 @@
 
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
+#include "widestereo/files.h"
 
 namespace ws = widestereo;
 
@@ -20,10 +21,10 @@ void CalibrationOutput::require_other_than(const std::string& calibration) const
   throw ws::Error(file + " is the calibration that is read; choose another file to write.");
 }
 
-void CalibrationOutput::write(const ws::Rig& rig) const {
-  if (format == "kalibr") {
-    ws::write_kalibr(file, rig);
-  } else {
-    ws::write_basalt(file, rig);
-  }
+void CalibrationOutput::require_form(const ws::Rig& rig) const { (void)text(rig); }
+
+void CalibrationOutput::write(const ws::Rig& rig) const { ws::write_text(file, text(rig)); }
+
+std::string CalibrationOutput::text(const ws::Rig& rig) const {
+  return format == "kalibr" ? ws::kalibr_text(file, rig) : ws::basalt_text(file, rig);
 }

@@ -133,6 +133,7 @@ void refine(const RefineArguments& arguments) {
   }
   arguments.output.require_other_than(arguments.rig.calibration);
   ws::require_writable(arguments.output.file);
+  arguments.output.require_form(rig);  // before the work of matching
   const std::vector<ws::ViewMatches> pairs =
       match_frames(rig, arguments.images, arguments.white_level);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);

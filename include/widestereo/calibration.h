@@ -40,14 +40,18 @@ struct Calibration {
 /// the file, the key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
-/// Writes a Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg
-/// where the field of view is limited). Throws Error for a rig that validate() refuses, where a
-/// camera has no Kalibr form (skew, k3, ...), and where the file cannot be written.
+/// A Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg where
+/// the field of view is limited), for a file that errors name. Throws Error for a rig that
+/// validate() refuses, and where a camera has no Kalibr form (skew, k3, ...).
+std::string kalibr_text(const std::filesystem::path& path, const Rig& rig);
+/// Writes it. Throws Error where the file cannot be written, too.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
-/// Writes a Basalt JSON; T_imu_cam of view 0 is the identity where no IMU is known, and the IMU's
-/// rate, biases and noise are Basalt's defaults. Throws Error for a rig that validate() refuses,
-/// where a camera has no Basalt form, and where the file cannot be written.
+/// A Basalt JSON, for a file that errors name; T_imu_cam of view 0 is the identity where no IMU is
+/// known, and the IMU's rate, biases and noise are Basalt's defaults. Throws Error for a rig that
+/// validate() refuses, and where a camera has no Basalt form.
+std::string basalt_text(const std::filesystem::path& path, const Rig& rig);
+/// Writes it. Throws Error where the file cannot be written, too.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);
 
 }  // namespace widestereo

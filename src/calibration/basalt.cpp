@@ -225,7 +225,7 @@ Rig read_basalt(const Document& document) {
 
 }  // namespace calibration
 
-void write_basalt(const std::filesystem::path& path, const Rig& rig) {
+std::string basalt_text(const std::filesystem::path& path, const Rig& rig) {
   using calibration::Json;
   validate(rig, "Cannot write " + path.string() + ": the rig");
   Json value;
@@ -254,7 +254,11 @@ void write_basalt(const std::filesystem::path& path, const Rig& rig) {
   }
   calibration::add_defaults(value);
   if (limited) value[calibration::max_theta_key] = limits;
-  write_text(path, Json{{"value0", value}}.dump(2) + "\n");
+  return Json{{"value0", value}}.dump(2) + "\n";
+}
+
+void write_basalt(const std::filesystem::path& path, const Rig& rig) {
+  write_text(path, basalt_text(path, rig));
 }
 
 }  // namespace widestereo

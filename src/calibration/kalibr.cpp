@@ -129,7 +129,7 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
 }  // namespace
 }  // namespace calibration
 
-void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
+std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
   validate(rig, "Cannot write " + path.string() + ": the rig");
   YAML::Emitter out;
   out << YAML::BeginMap;
@@ -164,7 +164,11 @@ void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
     out << YAML::EndMap;
   }
   out << YAML::EndMap;
-  write_text(path, std::string(out.c_str()) + "\n");
+  return std::string(out.c_str()) + "\n";
+}
+
+void write_kalibr(const std::filesystem::path& path, const Rig& rig) {
+  write_text(path, kalibr_text(path, rig));
 }
 
 }  // namespace widestereo

@@ -835,6 +835,17 @@ TEST_F(Command, CalibrationIsRefined) {
                    file("calib.yaml"),
                "3 image(s)");
   expect_error(refine + " -o " + file("no/refined.yaml"), "no/refined.yaml");
+  // Said before images are matched, in which there are no features.
+  folder_.write("mei.yaml", replaced(bytes_of("calib.yaml"),
+                                     "ds\n  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]\n"
+                                     "  distortion_model: none\n  distortion_coeffs: []",
+                                     "omni\n  intrinsics: [1.2, 58, 58, 47.9, 48.0]\n"
+                                     "  distortion_model: radtan\n"
+                                     "  distortion_coeffs: [0.01, 0, 0, 0]"));
+  expect_error("calibration refine " + flat + "-c " + file("mei.yaml") + " --to basalt -o " +
+                   file("no.json"),
+               "has no form in Basalt's format");
+  EXPECT_FALSE(fs::exists(folder_ / "no.json"));
   EXPECT_FALSE(fs::exists(folder_ / "no.yaml"));
 }
 
