@@ -12,6 +12,7 @@
 #include "matching_run.h"
 #include "option_checks.h"
 #include "roofline.h"
+#include "text/formatted.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/matcher.h"
@@ -59,41 +60,36 @@ void print_header(int runs) {
 void print_row(const Measurement& m) {
   const ws::KernelWork work = sum_of(m.kernels);
   const Roofline least = roofline(m.kernels, m.device.peaks);
-  char share[64] = "-";
-  if (least.milliseconds > 0 && m.on_device > 0) {
-    std::snprintf(share, sizeof share, "%.1f %% of %s", 100 * least.milliseconds / m.on_device,
-                  least.bound.c_str());
-  }
+  const auto share = least.share_of(m.on_device);
+  const std::string of_roofline =
+      share ? ws::formatted("%.1f %% of %s", 100 * *share, least.bound.c_str()) : "-";
   std::printf(
       "%-10s %-8s %5d %4d  %9.1f [%9.1f %9.1f]  %9.1f  %8.0f  %8.1f  %8.1f  %8.2f %6.1f  %-18s "
       "%6.1f\n",
       m.device.id.c_str(), m.preset.c_str(), m.size, m.window_radius, m.wall, m.wall_min,
       m.wall_max, m.on_device, work.samples / m.pixels(), m.per_second(1e-6 * work.samples),
       m.per_second(1e-9 * work.operations), m.per_second(1e-9 * work.texels),
-      m.per_second(1e-9 * work.bytes), share, static_cast<double>(m.device_bytes) / (1 << 20));
+      m.per_second(1e-9 * work.bytes), of_roofline.c_str(),
+      static_cast<double>(m.device_bytes) / (1 << 20));
   std::string shares;
   double one_by_one = 0;
   for (const ws::KernelTime& kernel : m.kernels) one_by_one += kernel.milliseconds;
   for (const ws::KernelTime& kernel : m.kernels) {
-    char text[64];
-    std::snprintf(text, sizeof text, " %s %.0f %%", kernel.kernel.c_str(),
-                  one_by_one > 0 ? 100 * kernel.milliseconds / one_by_one : 0);
-    shares += text;
+    shares += ws::formatted(" %s %.0f %%", kernel.kernel.c_str(),
+                            one_by_one > 0 ? 100 * kernel.milliseconds / one_by_one : 0);
   }
   std::printf("           %s\n", shares.c_str());
   std::fflush(stdout);
 }
 
 PlotBar bar_of(const Measurement& m) {
-  const Roofline least = roofline(m.kernels, m.device.peaks);
   return {m.device.id + "  " + m.preset + "  " + std::to_string(m.size) + " x " +
               std::to_string(m.size),
           m.wall,
           m.wall_min,
           m.wall_max,
           m.on_device,
-          least.milliseconds,
-          least.bound};
+          roofline(m.kernels, m.device.peaks)};
 }
 
 /// Given peaks are one device's.

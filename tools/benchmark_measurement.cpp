@@ -58,10 +58,10 @@ Json json_of(const ws::KernelWork& work, double milliseconds, const Roofline& le
                {"roofline_milliseconds", nullptr},
                {"roofline_bound", nullptr},
                {"roofline_share", nullptr}};
-  if (least.milliseconds > 0 && milliseconds > 0) {
+  if (const auto share = least.share_of(milliseconds)) {
     json["roofline_milliseconds"] = least.milliseconds;
     json["roofline_bound"] = least.bound;
-    json["roofline_share"] = least.milliseconds / milliseconds;
+    json["roofline_share"] = *share;
   }
   return json;
 }

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "text/formatted.h"
+
+namespace ws = widestereo;
 
 namespace {
 
@@ -15,13 +18,6 @@ constexpr double row_height = 34;
 constexpr const char* wall_colour = "#c6dbef";
 constexpr const char* device_colour = "#3b7fbd";
 constexpr const char* roofline_colour = "#d1495b";
-
-template <class... Arguments>
-std::string text(const char* format, Arguments... arguments) {
-  char buffer[512];
-  std::snprintf(buffer, sizeof buffer, format, arguments...);
-  return buffer;
-}
 
 std::string escaped(const std::string& plain) {
   std::string result;
@@ -38,17 +34,17 @@ std::string escaped(const std::string& plain) {
 }
 
 std::string label(double x, double y, const char* anchor, const std::string& content) {
-  return text("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", x, y, anchor) + escaped(content) +
-         "</text>\n";
+  return ws::formatted("<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", x, y, anchor) +
+         escaped(content) + "</text>\n";
 }
 
 std::string rectangle(double x0, double x1, double y, double height, const char* colour) {
-  return text("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\"/>\n", x0, y,
-              std::max(x1 - x0, 0.5), height, colour);
+  return ws::formatted("<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"%s\"/>\n",
+                       x0, y, std::max(x1 - x0, 0.5), height, colour);
 }
 
 std::string line(double x0, double y0, double x1, double y1, const char* colour, double thickness) {
-  return text(
+  return ws::formatted(
       "<line x1=\"%.1f\" y1=\"%.1f\" x2=\"%.1f\" y2=\"%.1f\" stroke=\"%s\" "
       "stroke-width=\"%.1f\"/>\n",
       x0, y0, x1, y1, colour, thickness);
@@ -57,7 +53,7 @@ std::string line(double x0, double y0, double x1, double y1, const char* colour,
 /// Three significant digits, no exponent.
 std::string number(double value) {
   const int digits = static_cast<int>(std::floor(std::log10(std::max(value, 1e-6))));
-  return text("%.*f", std::clamp(2 - digits, 0, 6), value);
+  return ws::formatted("%.*f", std::clamp(2 - digits, 0, 6), value);
 }
 
 /// Places of times on the picture, and the times marked below it.
@@ -66,8 +62,8 @@ class Axis {
   explicit Axis(const std::vector<PlotBar>& bars) {
     double smallest = 1e30;
     for (const PlotBar& bar : bars) {
-      largest_ = std::max({largest_, bar.wall_max, bar.device, bar.roofline, 1e-6});
-      for (const double time : {bar.wall_min, bar.device, bar.roofline}) {
+      largest_ = std::max({largest_, bar.wall_max, bar.device, bar.roofline.milliseconds, 1e-6});
+      for (const double time : {bar.wall_min, bar.device, bar.roofline.milliseconds}) {
         if (time > 0) smallest = std::min(smallest, time);
       }
     }
@@ -120,9 +116,10 @@ std::string row(const PlotBar& bar, const Axis& axis, double y) {
     svg += line(axis.at(end), y + 9, axis.at(end), y + 19, "#222", 1.2);
   }
   std::string value = number(bar.wall) + " (" + number(bar.device) + ")";
-  if (bar.roofline > 0) {
-    svg += line(axis.at(bar.roofline), y + 2, axis.at(bar.roofline), y + 26, roofline_colour, 3);
-    value += text(", %.0f %% of ", 100 * bar.roofline / bar.device) + bar.bound;
+  const double least = bar.roofline.milliseconds;
+  if (least > 0) svg += line(axis.at(least), y + 2, axis.at(least), y + 26, roofline_colour, 3);
+  if (const auto share = bar.roofline.share_of(bar.device)) {
+    value += ws::formatted(", %.0f %% of ", 100 * *share) + bar.roofline.bound;
   }
   return svg + label(right + 10, y + 18, "start", value);
 }
@@ -132,14 +129,14 @@ std::string row(const PlotBar& bar, const Axis& axis, double y) {
 std::string benchmark_plot(const std::vector<PlotBar>& bars) {
   const Axis axis(bars);
   const double bottom = top + row_height * static_cast<double>(bars.size());
-  std::string svg = text(
+  std::string svg = ws::formatted(
                         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" "
                         "font-family=\"sans-serif\" font-size=\"13\">\n",
                         width, bottom + 34) +
                     "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n" + legend(axis);
   for (const double mark : axis.marks()) {
     svg += line(axis.at(mark), top - 4, axis.at(mark), bottom + 4, "#ddd", 1);
-    svg += label(axis.at(mark), bottom + 20, "middle", text("%g", mark));
+    svg += label(axis.at(mark), bottom + 20, "middle", ws::formatted("%g", mark));
   }
   double y = top;
   for (const PlotBar& bar : bars) {

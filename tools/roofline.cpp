@@ -5,6 +5,11 @@
 
 namespace ws = widestereo;
 
+std::optional<double> Roofline::share_of(double time) const {
+  if (milliseconds > 0 && time > 0) return milliseconds / time;
+  return std::nullopt;
+}
+
 Roofline roofline(const ws::KernelWork& work, const ws::DevicePeaks& peaks) {
   Roofline longest;
   const auto consider = [&longest](double amount, double giga_per_second, const char* bound) {

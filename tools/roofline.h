@@ -3,6 +3,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,9 @@
 struct Roofline {
   double milliseconds = 0;  ///< 0 where none of the peaks is known
   std::string bound;        ///< what takes that long: "operations", "texels" or "bytes"
+
+  /// The share that it makes up of a time; none where either is not known.
+  std::optional<double> share_of(double time) const;
 };
 
 /// Of one kernel: the longest of its operations, texels and bytes, each at its peak.
