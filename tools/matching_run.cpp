@@ -70,7 +70,7 @@ void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images)
     cv::minMaxLoc(ws::to_grey_levels(images[i], "The image of " + view.name), &darkest, &brightest,
                   nullptr, nullptr, view.mask);
     if (brightest - darkest > noise) continue;
-    say("the image of " + view.name + " is blank but for noise; check its camera and lens.");
+    say("The image of " + view.name + " is blank but for noise; check its camera and lens.");
   }
 }
 
@@ -78,7 +78,7 @@ void report_views_without_overlap(const ws::Rig& rig, const ws::StereoResult& re
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     const cv::Mat alone = result.views[i].reasons & (ws::reason_no_ray | ws::reason_no_overlap);
     if (cv::countNonZero(alone) < static_cast<int>(alone.total())) continue;
-    say("no pixel of " + rig.views[i].name +
+    say("No pixel of " + rig.views[i].name +
         " is seen by another view within the distance range; check its calibration and mask, or "
         "leave it out.");
   }

@@ -375,7 +375,7 @@ TEST_F(Command, BlankImagesAreNamed) {
       run("depth " + file("left.png") + " " + file("right.png") + " " + file("dark.png") + " -c " +
           file("three.yaml") + " -o " + file("out") + quick);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("the image of cam2 is blank"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("The image of cam2 is blank"), std::string::npos) << outcome.output;
   EXPECT_EQ(outcome.output.find("cam1 is blank"), std::string::npos) << outcome.output;
   EXPECT_EQ(run(depth_of("left.png", "right.png")).output.find("blank"), std::string::npos);
 }
@@ -509,9 +509,9 @@ TEST_F(Command, ViewsThatNoOtherOverlapsAreNamed) {
       run("depth " + file("left.png") + " " + file("right.png") + " " + file("left.png") + " -c " +
           file("backwards.yaml") + " -o " + file("out") + quick);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("no pixel of cam2 is seen by another view"), std::string::npos)
+  EXPECT_NE(outcome.output.find("No pixel of cam2 is seen by another view"), std::string::npos)
       << outcome.output;
-  EXPECT_EQ(outcome.output.find("no pixel of cam1"), std::string::npos) << outcome.output;
+  EXPECT_EQ(outcome.output.find("No pixel of cam1"), std::string::npos) << outcome.output;
   EXPECT_NE(outcome.output.find("cam2: 0.0 % accepted, mean cost -, cost"), std::string::npos)
       << outcome.output;
   const nlohmann::json views = nlohmann::json::parse(bytes_of("out/result.json")).at("views");
