@@ -10,6 +10,7 @@
 #include "calibration_output.h"
 #include "json_text.h"
 #include "rig_settings.h"
+#include "say.h"
 #include "white_level.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -40,9 +41,8 @@ std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig, const std::vector<
         pairs.push_back({i, j, {}});
         continue;
       }
-      std::fprintf(stderr,
-                   "widestereo: %s and %s see next to nothing in common and are not matched.\n",
-                   rig.views[i].name.c_str(), rig.views[j].name.c_str());
+      say(rig.views[i].name + " and " + rig.views[j].name +
+          " see next to nothing in common and are not matched.");
     }
   }
   for (std::size_t frame = 0; frame < files.size(); frame += count) {

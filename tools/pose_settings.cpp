@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "pose_settings.h"
 
-#include <cstdio>
 #include <filesystem>
 #include <numeric>
 #include <utility>
 
 #include "option_checks.h"
+#include "say.h"
+#include "text/formatted.h"
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
@@ -58,10 +59,9 @@ Eigen::Vector3d move_near_origin(std::vector<ws::View>& views) {
   const Eigen::Vector3d origin = ws::local_origin(views.front());
   if (origin.isZero()) return origin;
   for (ws::View& view : views) view.world_from_camera.translation() -= origin;
-  std::fprintf(stderr,
-               "widestereo: poses and clouds are relative to (%.0f, %.0f, %.0f), as the model lies "
-               "far from its origin.\n",
-               origin.x(), origin.y(), origin.z());
+  say(ws::formatted(
+      "Poses and clouds are relative to (%.0f, %.0f, %.0f), as the model lies far from its origin.",
+      origin.x(), origin.y(), origin.z()));
   return origin;
 }
 

@@ -21,6 +21,7 @@
 #include "progress_bar.h"
 #include "result_folder.h"
 #include "result_folders.h"
+#include "say.h"
 #include "widestereo/error.h"
 #include "widestereo/fusion.h"
 #include "widestereo/image_io.h"
@@ -142,9 +143,8 @@ class Reconstruction {
   void run() {
     const std::size_t alone = alone_in(groups_);
     if (alone > 0) {
-      std::fprintf(stderr,
-                   "widestereo: %zu of %zu images see nothing that others see and are left out.\n",
-                   alone, images_.views.size());
+      say(std::to_string(alone) + " of " + std::to_string(images_.views.size()) +
+          " images see nothing that others see and are left out.");
     }
     const auto largest =
         std::max_element(groups_.begin(), groups_.end(),

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "rig_settings.h"
 
-#include <cstdio>
 #include <numbers>
 #include <opencv2/core.hpp>
 
 #include "geometry/angle.h"
+#include "say.h"
+#include "text/formatted.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -124,12 +125,9 @@ void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& 
       if (rim) rig.views[j].camera.max_theta = rim->usable;
     }
     if (!rim) continue;
-    std::fprintf(
-        stderr,
-        "widestereo: %s%s is black from %.1f degrees off the axis on and matched up to %.1f "
-        "(--max-theta 180 matches all).\n",
-        rig.views[i].name.c_str(),
-        of_camera.size() > 1 ? ", like the other images of its camera," : "",
-        rim->dark * ws::degrees_per_radian, rim->usable * ws::degrees_per_radian);
+    say(rig.views[i].name + (of_camera.size() > 1 ? ", like the other images of its camera," : "") +
+        ws::formatted(" is black from %.1f degrees off the axis on and matched up to %.1f "
+                      "(--max-theta 180 matches all).",
+                      rim->dark * ws::degrees_per_radian, rim->usable * ws::degrees_per_radian));
   }
 }

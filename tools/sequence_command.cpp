@@ -22,6 +22,7 @@
 #include "progress_bar.h"
 #include "result_folder.h"
 #include "rig_settings.h"
+#include "say.h"
 #include "sequence_folder.h"
 #include "sharpness_settings.h"
 #include "size_settings.h"
@@ -216,9 +217,7 @@ class SequenceRun {
     const std::vector<cv::Mat> images = images_of(frame);
     previous_ = {blurred(images, selection_.blurs), folder_.planes(frame.name, selection_.rig)};
     if (previous_.views.empty() && !arguments_.no_warm_start) {
-      std::fprintf(stderr,
-                   "widestereo: The planes of frame %s are gone; the next one starts from none.\n",
-                   frame.name.c_str());
+      say("The planes of frame " + frame.name + " are gone; the next one starts from none.");
     }
   }
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "sharpness_settings.h"
 
-#include <cstdio>
-
+#include "say.h"
+#include "text/formatted.h"
 #include "widestereo/epipolar.h"
 #include "widestereo/error.h"
 #include "widestereo/sharpness.h"
@@ -12,10 +12,9 @@ namespace ws = widestereo;
 namespace {
 
 void say_of(const ws::Rig& rig, std::size_t blurred, const char* why, double blur) {
-  std::fprintf(stderr,
-               "widestereo: %s %s than %s and is blurred by %.2f pixels before it is matched "
-               "(--blur 0 matches it as it is).\n",
-               rig.views[blurred].name.c_str(), why, rig.views[1 - blurred].name.c_str(), blur);
+  say(rig.views[blurred].name + " " + why + " than " + rig.views[1 - blurred].name +
+      ws::formatted(" and is blurred by %.2f pixels before it is matched ", blur) +
+      "(--blur 0 matches it as it is).");
 }
 
 }  // namespace

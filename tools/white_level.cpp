@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "white_level.h"
 
-#include <cstdio>
 #include <opencv2/core.hpp>
 
+#include "say.h"
 #include "widestereo/image_io.h"
 
 namespace ws = widestereo;
@@ -24,10 +24,7 @@ cv::Mat WhiteLevel::read(const std::filesystem::path& file) const {
   cv::minMaxLoc(image.reshape(1), nullptr, &brightest);
   if (brightest > of_12_bits) return image;
   told_ = true;
-  std::fprintf(
-      stderr,
-      "widestereo: %s has 16 bits, but no value above %.0f, and is taken for a dark image; "
-      "where the camera has 12 bits, give --white-level 4095.\n",
-      file.c_str(), brightest);
+  say(file.string() + " has 16 bits, but no value above " + std::to_string(cvRound(brightest)) +
+      ", and is taken for a dark image; where the camera has 12 bits, give --white-level 4095.");
   return image;
 }
