@@ -102,6 +102,7 @@ Eigen::Quaterniond require_unit(const Eigen::Quaterniond& quaternion, const std:
                                 const std::string& remedy) {
   const double length = quaternion.norm();
   if (std::abs(length - 1) <= 1e-2) return quaternion.normalized();
+  // Single precision has no digits of rounding.
   throw Error(name + " has a quaternion of length " + text_of(static_cast<float>(length)) +
               " instead of 1; " + remedy + ".");
 }

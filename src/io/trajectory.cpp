@@ -212,6 +212,7 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
       --nearest;
     }
     if (!(apart(*nearest) <= tolerance)) {
+      // Single precision has no digits of the subtraction's rounding.
       throw Error(name + " has no pose within " + text_of(tolerance) + " s of the frame " +
                   frame.name + " (the nearest is " + text_of(static_cast<float>(apart(*nearest))) +
                   " s away); check the clocks, choose frames or raise the tolerance.");
