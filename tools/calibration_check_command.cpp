@@ -8,6 +8,7 @@
 #include "calibration_commands.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
+#include "text/formatted.h"
 #include "white_level.h"
 #include "widestereo/epipolar.h"
 #include "widestereo/error.h"
@@ -60,17 +61,12 @@ std::string verdict_behind(const ws::View& first, const ws::View& second,
 }
 
 std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
-  char text[160];
   if (lie_behind(report)) {
-    std::snprintf(text, sizeof text, "%.0f %% of the features lie behind the cameras",
-                  100 * report.behind);
-  } else if (!(report.nearest > 0)) {
-    return "no feature is near enough and matched well enough to tell";
-  } else {
-    std::snprintf(text, sizeof text, "5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s",
-                  report.nearest, unit, report.typical, unit, report.farthest, unit);
+    return ws::formatted("%.0f %% of the features lie behind the cameras", 100 * report.behind);
   }
-  return text;
+  if (!(report.nearest > 0)) return "no feature is near enough and matched well enough to tell";
+  return ws::formatted("5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s", report.nearest,
+                       unit, report.typical, unit, report.farthest, unit);
 }
 
 void check(const CheckArguments& arguments) {

@@ -9,6 +9,7 @@
 #include "geometry/angle.h"
 #include "json_text.h"
 #include "rig_settings.h"
+#include "text/formatted.h"
 #include "widestereo/calibration.h"
 
 namespace ws = widestereo;
@@ -109,9 +110,7 @@ nlohmann::ordered_json describe_imu(const Eigen::Isometry3d& first_from_imu) {
 /// Most formats do not say where the lens ends.
 std::string limit_of_lens(double max_theta_degrees) {
   if (max_theta_degrees >= 180) return "lens not limited";
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f (lens)", max_theta_degrees);
-  return text;
+  return ws::formatted("%.1f (lens)", max_theta_degrees);
 }
 
 void show(const ShowArguments& arguments) {

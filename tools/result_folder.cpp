@@ -2,7 +2,6 @@
 #include "result_folder.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -18,6 +17,7 @@
 #include "json_text.h"
 #include "option_checks.h"
 #include "temporary_folder.h"
+#include "text/formatted.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -317,11 +317,7 @@ void FolderFormat::require_room_for(double min_distance, double max_distance) co
   };
   const bool too_far = max_distance * png_scale > largest;
   if (!too_far && !is_lost(png_scale)) return;
-  const auto text = [](double number) {
-    char digits[32];
-    std::snprintf(digits, sizeof digits, "%g", number);
-    return std::string(digits);
-  };
+  const auto text = [](double number) { return ws::formatted("%g", number); };
   const std::string but = " at --png-scale " + text(png_scale) + ", but they ";
   const double scale = std::pow(10.0, std::floor(std::log10(largest / max_distance)));
   throw ws::Error(
@@ -365,12 +361,7 @@ Json write_result_folder(const fs::path& folder, const FolderContents& contents,
   return record;
 }
 
-std::string cost_text(double cost) {
-  if (std::isnan(cost)) return "-";
-  std::array<char, 16> text{};
-  std::snprintf(text.data(), text.size(), "%.3f", cost);
-  return text.data();
-}
+std::string cost_text(double cost) { return std::isnan(cost) ? "-" : ws::formatted("%.3f", cost); }
 
 void report(const Json& record, const fs::path& folder, bool as_json) {
   if (as_json) {

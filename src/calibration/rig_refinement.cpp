@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 #include <utility>
 
 #include "geometry/angle.h"
 #include "statistics/percentile.h"
 #include "statistics/robust.h"
+#include "text/formatted.h"
 #include "widestereo/error.h"
 #include "widestereo/view_selection.h"
 
@@ -311,10 +311,8 @@ void require_credible(const RigRefinement& refined, const std::vector<ViewMatche
   const auto require_small = [](double change, double deviation, const std::string& what) {
     const double limit = largest_change * deviation * degrees_per_radian;
     if (change <= limit) return;
-    char text[128];
-    std::snprintf(text, sizeof text, " by %.1f degrees, more than the %.1f that are believed",
-                  change, limit);
-    fail("The matched features turn " + what + text);
+    fail("The matched features turn " + what +
+         formatted(" by %.1f degrees, more than the %.1f that are believed", change, limit));
   };
   for (std::size_t i = 0; i < refined.views.size(); ++i) {
     const std::string& name = refined.rig.views[i].name;

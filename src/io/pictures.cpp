@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -14,6 +13,7 @@
 #include "geometry/validation.h"
 #include "io/bgr8.h"
 #include "statistics/percentile.h"
+#include "text/formatted.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
 
@@ -78,9 +78,7 @@ void put_text(cv::Mat& picture, const std::string& text, cv::Point at, double sc
 }
 
 std::string metres(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, value < 1 ? "%.2f" : value < 10 ? "%.1f" : "%.0f", value);
-  return text;
+  return formatted(value < 1 ? "%.2f" : value < 10 ? "%.1f" : "%.0f", value);
 }
 
 /// A horizontal bar from share 0 to 1 with labels at given shares.
