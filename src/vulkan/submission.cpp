@@ -10,6 +10,17 @@ constexpr std::uint64_t no_timeout = std::numeric_limits<std::uint64_t>::max();
 
 }  // namespace
 
+Handle<VkCommandPool> make_command_pool(const VulkanContext& context) {
+  VkCommandPoolCreateInfo info{};
+  info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
+  info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
+  info.queueFamilyIndex = context.queue_family();
+  VkCommandPool pool = VK_NULL_HANDLE;
+  context.check(context.vk().vkCreateCommandPool(context.device(), &info, nullptr, &pool),
+                "make a command pool");
+  return context.own(pool, context.vk().vkDestroyCommandPool);
+}
+
 Submission::Submission(const VulkanContext& context, VkCommandPool pool,
                        std::uint32_t max_timestamps)
     : context_(context), max_timestamps_(max_timestamps) {

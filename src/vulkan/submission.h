@@ -7,6 +7,9 @@
 
 namespace widestereo {
 
+/// Of command buffers that are recorded again and again.
+Handle<VkCommandPool> make_command_pool(const VulkanContext& context);
+
 /// A command buffer of our own with the fence that tells when it has finished and timestamps in
 /// between.
 class Submission {

@@ -77,17 +77,6 @@ Handle<VkSampler> make_sampler(const VulkanContext& context, bool filters) {
   return context.own(sampler, context.vk().vkDestroySampler);
 }
 
-Handle<VkCommandPool> make_command_pool(const VulkanContext& context) {
-  VkCommandPoolCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-  info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-  info.queueFamilyIndex = context.queue_family();
-  VkCommandPool pool = VK_NULL_HANDLE;
-  context.check(context.vk().vkCreateCommandPool(context.device(), &info, nullptr, &pool),
-                "make a command pool");
-  return context.own(pool, context.vk().vkDestroyCommandPool);
-}
-
 }  // namespace
 
 VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv::Size>& sizes,

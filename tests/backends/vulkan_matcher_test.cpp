@@ -11,6 +11,7 @@
 #include "pixel_fixture.h"
 #include "same_bits.h"
 #include "vulkan/memory.h"
+#include "vulkan/submission.h"
 #include "vulkan_fixture.h"
 #include "widestereo/matcher.h"
 #include "widestereo/vulkan.h"
@@ -74,15 +75,10 @@ class Commands {
  public:
   explicit Commands(const VulkanContext& context) : context_(context) {
     const DeviceFunctions& vk = context.vk();
-    VkCommandPoolCreateInfo pool_info{};
-    pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-    pool_info.queueFamilyIndex = context.queue_family();
-    VkCommandPool pool = VK_NULL_HANDLE;
-    context.check(vk.vkCreateCommandPool(context.device(), &pool_info, nullptr, &pool), "pool");
-    pool_ = context.own(pool, vk.vkDestroyCommandPool);
+    pool_ = make_command_pool(context);
     VkCommandBufferAllocateInfo info{};
     info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO;
-    info.commandPool = pool;
+    info.commandPool = pool_.get();
     info.commandBufferCount = 1;
     context.check(vk.vkAllocateCommandBuffers(context.device(), &info, &commands_), "commands");
     VkFenceCreateInfo fence_info{};

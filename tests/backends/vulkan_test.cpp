@@ -16,6 +16,7 @@
 #include "match_fixture.h"
 #include "same_bits.h"
 #include "vulkan/physical_device.h"
+#include "vulkan/submission.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"
 #include "widestereo/matcher.h"
@@ -263,14 +264,7 @@ TEST(VulkanMatch, RecordsIntoAnApplicationsCommandBuffer) {
   const cv::Mat nothing(match.view(0).rays.size(), CV_32FC4, cv::Scalar::all(0));
   backend.set_hypotheses(0, nothing);
 
-  const DeviceFunctions& vk = application.context.vk();
-  VkCommandPoolCreateInfo pool_info{};
-  pool_info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-  pool_info.queueFamilyIndex = application.context.queue_family();
-  VkCommandPool pool_handle = VK_NULL_HANDLE;
-  ASSERT_EQ(vk.vkCreateCommandPool(application.context.device(), &pool_info, nullptr, &pool_handle),
-            VK_SUCCESS);
-  const auto pool = application.context.own(pool_handle, vk.vkDestroyCommandPool);
+  const auto pool = make_command_pool(application.context);
   Submission submission(application.context, pool.get(), 2);
   const VkCommandBuffer commands = submission.begin();
   backend.record_parameters(commands, match.schedule());
@@ -462,23 +456,12 @@ TEST(VulkanValidation, MissingLayerIsAnError) {
   EXPECT_EQ(error_of([&] { open_vulkan_device(0, {}, get); }), "");
 }
 
-Handle<VkCommandPool> command_pool(const VulkanContext& context) {
-  VkCommandPoolCreateInfo info{};
-  info.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO;
-  info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT;
-  info.queueFamilyIndex = context.queue_family();
-  VkCommandPool pool = VK_NULL_HANDLE;
-  context.check(context.vk().vkCreateCommandPool(context.device(), &info, nullptr, &pool),
-                "make a command pool");
-  return context.own(pool, context.vk().vkDestroyCommandPool);
-}
-
 /// Matchers of one device share its queue, which Vulkan lets one thread at a time use.
 TEST(VulkanValidation, HasNothingToSayOfSubmissionsFromTwoThreads) {
   REQUIRE_VULKAN_OR_SKIP();
   Application application;
   const auto submit_often = [&application] {
-    const auto pool = command_pool(application.context);
+    const auto pool = make_command_pool(application.context);
     Submission submission(application.context, pool.get(), 2);
     for (int i = 0; i < 1000; ++i) {
       submission.begin();
@@ -498,7 +481,7 @@ TEST(VulkanValidation, ReportsAMissingBarrier) {
   const VulkanContext& context = application.context;
   const DeviceFunctions& vk = context.vk();
   const Buffer buffer = make_device_buffer(context, 64, VK_BUFFER_USAGE_TRANSFER_DST_BIT, "a test");
-  const auto pool = command_pool(context);
+  const auto pool = make_command_pool(context);
   Submission submission(context, pool.get(), 2);
   const VkCommandBuffer commands = submission.begin();
   const float zeros[16] = {};
