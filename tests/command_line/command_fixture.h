@@ -80,27 +80,23 @@ class Command : public ::testing::Test {
   static constexpr const char* quick =
       " --preset paper --device cpu --iterations 2 --second-iterations 1 --window-radius 2"
       " --min-distance 0.4 --max-distance 8 ";
-
-  void SetUp() override {
-    const std::string calibration = R"(cam0:
-  camera_model: ds
-  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
-  distortion_model: none
-  distortion_coeffs: []
-  resolution: [96, 96]
-  max_theta_deg: 97.5
-cam1:
-  T_cn_cnm1:
-  - [1.0, 0.0, 0.0, -0.1]
-  - [0.0, 1.0, 0.0, 0.0]
-  - [0.0, 0.0, 1.0, 0.0]
-  - [0.0, 0.0, 0.0, 1.0]
-  camera_model: ds
+  /// Of each camera, as a Kalibr camchain has it.
+  static constexpr const char* lens = R"(  camera_model: ds
   intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
   distortion_model: none
   distortion_coeffs: []
   resolution: [96, 96]
 )";
+
+  void SetUp() override {
+    const std::string calibration = "cam0:\n" + std::string(lens) + "  max_theta_deg: 97.5\n" +
+                                    R"(cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.1]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+)" + lens;
     folder_.write("calib.yaml", calibration);
     cv::Mat noise(96, 96, CV_8UC3);
     cv::theRNG().state = 3;
@@ -130,13 +126,8 @@ cam1:
     text.replace(text.find(wide), wide.size(), narrow);
     text += R"(cam2:
   T_cn_cnm1: [[-1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]
-  camera_model: ds
-  intrinsics: [-0.165, 0.59, 28.9, 28.9, 47.9, 48.0]
-  distortion_model: none
-  distortion_coeffs: []
-  resolution: [96, 96]
-)";
-    folder_.write("backwards.yaml", text + narrow);
+)" + (lens + narrow);
+    folder_.write("backwards.yaml", text);
   }
 
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
