@@ -7,12 +7,12 @@
 #include "benchmark_measurement.h"
 #include "benchmark_plot.h"
 #include "commands.h"
-#include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"
 #include "roofline.h"
 #include "text/formatted.h"
+#include "text/json_text.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/matcher.h"
@@ -145,8 +145,8 @@ void run_benchmark(BenchmarkArguments a) {
       }
     }
   }
-  if (a.as_json) std::cout << to_text(rows) << "\n";
-  if (!a.output.empty()) ws::write_text(a.output, to_text(rows) + "\n");
+  if (a.as_json) std::cout << ws::to_text(rows) << "\n";
+  if (!a.output.empty()) ws::write_text(a.output, ws::to_text(rows) + "\n");
   if (!a.plot.empty()) ws::write_text(a.plot, benchmark_plot(bars));
 }
 

@@ -8,9 +8,9 @@
 
 #include "calibration_commands.h"
 #include "calibration_output.h"
-#include "json_text.h"
 #include "rig_settings.h"
 #include "say.h"
+#include "text/json_text.h"
 #include "white_level.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -141,7 +141,7 @@ void refine(const RefineArguments& arguments) {
   if (arguments.as_json) {
     nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
     json.update(to_json(refined, pairs));
-    std::cout << to_text(json) << "\n";
+    std::cout << ws::to_text(json) << "\n";
     return;
   }
   print(refined, pairs, arguments.intrinsics);

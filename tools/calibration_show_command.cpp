@@ -7,9 +7,9 @@
 
 #include "calibration_commands.h"
 #include "geometry/angle.h"
-#include "json_text.h"
 #include "rig_settings.h"
 #include "text/formatted.h"
+#include "text/json_text.h"
 #include "widestereo/calibration.h"
 
 namespace ws = widestereo;
@@ -126,7 +126,7 @@ void show(const ShowArguments& arguments) {
   }
   if (const auto& imu = calibration.rig.world_from_imu) json["imu"] = describe_imu(*imu);
   if (arguments.as_json) {
-    std::cout << to_text(json) << "\n";
+    std::cout << ws::to_text(json) << "\n";
     return;
   }
   std::printf("%s: %s\n", arguments.file.c_str(), name_of(calibration.format));

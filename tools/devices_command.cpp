@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "commands.h"
-#include "json_text.h"
 #include "roofline.h"
+#include "text/json_text.h"
 #include "widestereo/device.h"
 
 namespace {
@@ -32,7 +32,7 @@ void print_devices(bool as_json) {
     std::cout << "\n";
   }
   if (as_json) {
-    std::cout << to_text(list) << "\n";
+    std::cout << widestereo::to_text(list) << "\n";
     return;
   }
   for (const auto& [kind, name] : {std::pair(widestereo::DeviceKind::cuda, "CUDA"),

@@ -13,7 +13,6 @@
 
 #include "commands.h"
 #include "input_record.h"
-#include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"
@@ -22,6 +21,7 @@
 #include "result_folder.h"
 #include "result_folders.h"
 #include "say.h"
+#include "text/json_text.h"
 #include "widestereo/error.h"
 #include "widestereo/fusion.h"
 #include "widestereo/image_io.h"
@@ -313,7 +313,7 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   reconstruction.run();
   const Json& record = reconstruction.folders().record();
   if (arguments.as_json) {
-    std::cout << to_text(record) << "\n";
+    std::cout << ws::to_text(record) << "\n";
     return;
   }
   double accepted = 0;

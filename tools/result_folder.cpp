@@ -14,10 +14,10 @@
 
 #include "geometry/angle.h"
 #include "input_record.h"
-#include "json_text.h"
 #include "option_checks.h"
 #include "temporary_folder.h"
 #include "text/formatted.h"
+#include "text/json_text.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -355,7 +355,7 @@ Json write_result_folder(const fs::path& folder, const FolderContents& contents,
         ViewWriter(unfinished.path(), contents, format, static_cast<int>(i)).write());
   }
   if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
-  ws::write_text(unfinished.path() / result_record, to_text(record) + "\n");
+  ws::write_text(unfinished.path() / result_record, ws::to_text(record) + "\n");
   remove_earlier_result(folder);
   move_result(unfinished.path(), folder, record);
   return record;
@@ -365,7 +365,7 @@ std::string cost_text(double cost) { return std::isnan(cost) ? "-" : ws::formatt
 
 void report(const Json& record, const fs::path& folder, bool as_json) {
   if (as_json) {
-    std::cout << to_text(record) << "\n";
+    std::cout << ws::to_text(record) << "\n";
     return;
   }
   std::printf("%s: %.2f s, %.0f million patch samples (preset %s)\n",

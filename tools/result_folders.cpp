@@ -5,9 +5,9 @@
 #include <fstream>
 #include <utility>
 
-#include "json_text.h"
 #include "result_folder.h"
 #include "temporary_folder.h"
+#include "text/json_text.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -21,8 +21,8 @@ constexpr const char* removed = ".removed";
 
 /// The first setting (of objects) that differs, as "NAME is A there and B now"; empty if none does.
 std::string first_difference(const Json& there, const Json& now) {
-  const auto a = nlohmann::json::parse(to_text(there));
-  const auto b = nlohmann::json::parse(to_text(now));
+  const auto a = nlohmann::json::parse(ws::to_text(there));
+  const auto b = nlohmann::json::parse(ws::to_text(now));
   const nlohmann::json differences = nlohmann::json::diff(a, b);
   if (differences.empty()) return "";
   auto path = nlohmann::json::json_pointer(differences[0]["path"].get<std::string>());
@@ -165,5 +165,5 @@ void ResultFolders::note(const std::string& key, Json value) {
 }
 
 void ResultFolders::write_record() const {
-  ws::write_text(record_path(kind_.name), to_text(record_) + "\n");
+  ws::write_text(record_path(kind_.name), ws::to_text(record_) + "\n");
 }

@@ -14,7 +14,6 @@
 #include "commands.h"
 #include "frame_settings.h"
 #include "input_record.h"
-#include "json_text.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"
@@ -26,6 +25,7 @@
 #include "sequence_folder.h"
 #include "sharpness_settings.h"
 #include "size_settings.h"
+#include "text/json_text.h"
 #include "text/number.h"
 #include "white_level.h"
 #include "widestereo/error.h"
@@ -368,7 +368,7 @@ void run_sequence(const SequenceArguments& arguments) {
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
   if (arguments.as_json) {
-    std::cout << to_text(run.folder().record()) << "\n";
+    std::cout << ws::to_text(run.folder().record()) << "\n";
     return;
   }
   std::printf("%zu frames are in %s\n", run.folder().frames().size(), arguments.output.c_str());

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "text/json_text.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -201,8 +202,7 @@ std::string to_json(const Options& o) {
                                        {"min_confidence", o.min_confidence},
                                        {"ambiguity_margin", o.ambiguity_margin},
                                        {"fill_radius", o.fill_radius}};
-  // The preset's name is the caller's and need not be UTF-8: what is not becomes U+FFFD.
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return to_text(json);
 }
 
 }  // namespace widestereo
