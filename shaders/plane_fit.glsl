@@ -25,6 +25,7 @@ struct PlaneFit {
   LocalPlane plane;
   float certainty;   // inverse variance of the offset, as if each pixel of the neighbourhood were measured by itself
   vec3 information;  // inverse covariance of the slopes (xx, xy, yy), of the grid's pixels alone
+  float agreement;   // share of the neighbours' weights that robustness leaves: 1 where all lie on the guess
 };
 
 // One round of robust weighted least squares over a sparse grid of the neighbourhood; false where it is
@@ -34,6 +35,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.plane = guess;
   fit.certainty = 0.0f;
   fit.information = vec3(0.0f, 0.0f, 0.0f);
+  fit.agreement = 1.0f;
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   float inverse_scale = PARAMETERS.support.y;
   float of_own = OWN_SHARE * PASS.tolerance * own.x;
@@ -49,6 +51,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   int last_x = min(pixel.x + radius, size.x - 1);
   int last_y = min(pixel.y + radius, size.y - 1);
   float s = 0.0f;
+  float undoubted = 0.0f;
   float sx = 0.0f;
   float sy = 0.0f;
   float sxx = 0.0f;
@@ -78,8 +81,11 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       float remoteness = 1.0f + fall_off * (squared_dy + dx * dx);
       float unlikeness = root_of_unlikeness(measure.w - own.w, inverse_scale);
       float trust = measure.y * scale2;
-      float weight = trust * trust * (1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness)));
-      if (measure.x >= UNMEASURED_VARIANCE) weight = 0.0f;
+      float most = measure.y * doubt;
+      float divided = 1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness));
+      if (measure.x >= UNMEASURED_VARIANCE) divided = 0.0f;
+      float weight = trust * trust * divided;
+      undoubted += most * most * divided;
       float zw = weight * z;
       float xw = weight * x;
       float yw = weight * y;
@@ -97,6 +103,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   }
   fit.certainty = s * float(step * step);
   if (!(s > 0.0f)) return false;
+  fit.agreement = s / undoubted;
   float mx = sx / s;
   float my = sy / s;
   // A weak pull towards the guess decides slopes that the neighbourhood leaves open.

@@ -8,6 +8,13 @@
 // variance, which is too small by the pixels of a patch, as neighbours share most of theirs.
 #define SMALLEST_SQUARED_MOVE 0.25f
 #define LARGEST_SQUARED_MOVE 300.0f
+// Those of neighbourhoods that hold other surfaces, too: less than this share of their weights agrees. Among what was
+// measured for the first time it may be outliers that disagree, of which there are fewer from round to round.
+#define LEAST_AGREEMENT 0.4f
+#define SMALLEST_SQUARED_MOVE_OF_MIXED 0.01f
+#define LARGEST_SQUARED_MOVE_OF_MIXED 9.0f
+
+FN bool mixes_surfaces(CONTEXT_ARGUMENT PlaneFit fit) { return PASS.tolerance < 1.0f && fit.agreement < LEAST_AGREEMENT; }
 
 // The plane of the smallest neighbourhood that determines its offset to PASS.deviation, or of the largest that does not
 // contradict the one before: a thin surface never determines its own, and what is behind it would outvote it. With
@@ -27,7 +34,10 @@ FN bool regress_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 so
     if (!fit_plane(CONTEXT pixel, ray, east, south, own, round, radius, plane, fit)) continue;
     float move = fit.plane.offset - offset;
     float squared_move = move * move;
-    if (squared_move * certainty > LARGEST_SQUARED_MOVE && squared_move * own.y * own.y > SMALLEST_SQUARED_MOVE) break;
+    bool mixed = mixes_surfaces(CONTEXT fit);
+    float in_variances = mixed ? LARGEST_SQUARED_MOVE_OF_MIXED : LARGEST_SQUARED_MOVE;
+    float in_pixels = mixed ? SMALLEST_SQUARED_MOVE_OF_MIXED : SMALLEST_SQUARED_MOVE;
+    if (squared_move * certainty > in_variances && squared_move * own.y * own.y > in_pixels) break;
     plane = fit.plane;
     certainty = fit.certainty;
     found = true;

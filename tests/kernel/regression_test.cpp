@@ -229,6 +229,20 @@ TEST_F(Regression, LaterRoundsTellSmoothSurfacesApartThatLieNearEachOther) {
   EXPECT_LT(error(0.36f), 0.7 * error(1));
 }
 
+TEST_F(Regression, LaterRoundsDoNotLetLargerSurfacesAroundMoveSmallOnes) {
+  const auto strip = [](int x) -> Eigen::Vector3d {  // 0.6 px before the wall
+    return 46 <= x && x < 50 ? 1.4 * wall : wall;
+  };
+  measure(strip, 0.02, 0.1);
+  for (cv::Vec4f& check : fixture_.view(0).checks) check[0] = 0.2f * 0.2f;
+  EXPECT_LT(over_pixels(46, 49,
+                        [&](ivec2 pixel) {
+                          return displacement(pixel, regressed(pixel, 40, 0.015, 4, 0, 0.36f),
+                                              strip(pixel.x));
+                        }),
+            0.2);
+}
+
 TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {
   const ivec2 pixel(48, 48);
   const cv::Vec4f held(0, 0, 0.5f, 0.1f);
