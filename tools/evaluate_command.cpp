@@ -119,7 +119,9 @@ void run_evaluate(EvaluateArguments a) {
 void add_evaluate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("evaluate", "Score a distance map against ground truth");
   auto a = std::make_shared<EvaluateArguments>();
-  command->add_option("prediction", a->prediction, "Distance map: .tiff, .pfm or 16-bit .png in mm")
+  command
+      ->add_option("prediction", a->prediction,
+                   "Distance map: .tiff, .exr, .pfm or 16-bit .png in mm")
       ->required();
   command->add_option("--normals", a->normals, "Normal map to score as well");
   command->add_option(

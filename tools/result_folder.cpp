@@ -267,9 +267,9 @@ void report_little_accepted(double share) {
 }
 
 void FolderFormat::add_maps_to(CLI::App& command) {
-  command.add_option("--formats", maps, "Distance maps: tiff, pfm, png (several by comma)")
+  command.add_option("--formats", maps, "Distance maps: tiff, exr, pfm, png (several by comma)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"tiff", "pfm", "png"}))
+      ->check(CLI::IsMember({"tiff", "exr", "pfm", "png"}))
       ->capture_default_str()
       ->group(group);
   command.add_option("--png-scale", png_scale, "Units per metre of 16-bit PNG distances")

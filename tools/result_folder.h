@@ -21,7 +21,7 @@ inline constexpr const char* unfinished_result = ".unfinished";
 
 /// Which files are written.
 struct FolderFormat {
-  std::vector<std::string> maps = {"tiff"};  ///< of distance: tiff, pfm, png
+  std::vector<std::string> maps = {"tiff"};  ///< of distance: tiff, exr, pfm, png
   static constexpr double usual_png_scale = 1000;
   double png_scale = usual_png_scale;  ///< units per metre of the 16-bit PNG
   bool no_cloud = false;

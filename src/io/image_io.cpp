@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "geometry/validation.h"
+#include "io/exr.h"
 #include "io/pfm.h"
 #include "text/lower_case.h"
 #include "widestereo/error.h"
@@ -271,6 +272,7 @@ cv::Mat read_grey_levels(const std::filesystem::path& path) {
 cv::Mat read_map(const fs::path& path, double png_scale) {
   const std::string extension = extension_of(path);
   if (extension == ".pfm") return read_pfm(path, read_bytes(path));
+  if (extension == ".exr") return read_exr(path, read_bytes(path));
   const cv::Mat image = decode(path);
   cv::Mat map;
   if (image.type() == CV_16UC1) {
@@ -278,8 +280,9 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
   } else if (image.type() == CV_32FC1 || image.type() == CV_32FC3) {
     map = with_channels_swapped(image);
   } else {
-    throw Error(path.string() +
-                " is not a float map; give a 32-bit float TIFF or PFM, or a 16-bit PNG.");
+    throw Error(
+        path.string() +
+        " is not a float map; give a 32-bit float TIFF or PFM, an OpenEXR image, or a 16-bit PNG.");
   }
   return map;
 }
@@ -292,6 +295,8 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
   const std::string extension = extension_of(path);
   if (extension == ".pfm") {
     write_file(path, [&](std::ostream& stream) { write_pfm(stream, map); });
+  } else if (extension == ".exr") {
+    write_file(path, [&](std::ostream& stream) { write_exr(stream, map); });
   } else if (extension == ".tif" || extension == ".tiff") {
     // By default OpenCV compresses three float channels with loss (LogLuv).
     constexpr int no_compression = 1;
@@ -300,7 +305,7 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
     encode(path, to_png16(map, png_scale));
   } else {
     throw Error("Cannot write " + path.string() +
-                ": maps are written as .tiff, .pfm or (one channel) .png.");
+                ": maps are written as .tiff, .exr, .pfm or (one channel) .png.");
   }
 }
 

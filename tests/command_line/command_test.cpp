@@ -63,7 +63,8 @@ TEST_F(Command, DemoLooksAround) {
 }
 
 TEST_F(Command, DepthWritesEveryFormatAndJson) {
-  const Outcome outcome = run(depth_of("left.png", "right.png") + "--formats tiff,pfm,png --json");
+  const Outcome outcome =
+      run(depth_of("left.png", "right.png") + "--formats tiff,exr,pfm,png --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const nlohmann::json record = nlohmann::json::parse(outcome.output);
   EXPECT_EQ(record["views"].size(), 2u);
@@ -76,7 +77,9 @@ TEST_F(Command, DepthWritesEveryFormatAndJson) {
       EXPECT_NEAR(png.at<ushort>(y, x) / 1000.0, static_cast<double>(tiff.at<float>(y, x)), 6e-4);
     }
   }
-  EXPECT_TRUE(fs::exists(folder_ / "out/distance0.pfm"));
+  for (const char* name : {"out/distance0.exr", "out/distance0.pfm"}) {
+    EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+  }
 }
 
 TEST_F(Command, DepthRecordsMasks) {

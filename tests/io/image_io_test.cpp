@@ -19,6 +19,7 @@
 #include "bytes_of.h"
 #include "comma_locale.h"
 #include "error_of.h"
+#include "random_map.h"
 #include "same_bits.h"
 #include "temporary_folder.h"
 #include "widestereo/error.h"
@@ -30,23 +31,17 @@ namespace {
 
 using test::bytes_of;
 using test::error_of;
+using test::random_map;
 using test::same_bits;
 using test::TemporaryFolder;
 
-cv::Mat random_map(int type) {
-  cv::Mat map(37, 53, type);
-  cv::theRNG().state = 12;
-  cv::randu(map, -3, 9);
-  return map;
-}
-
-TEST(Maps, TiffAndPfmKeepEveryBit) {
+TEST(Maps, TiffPfmAndExrKeepEveryBit) {
   const TemporaryFolder folder;
   for (const int type : {CV_32FC1, CV_32FC3}) {
     cv::Mat map = random_map(type);
     map.ptr<float>(3)[5] = INFINITY;
     map.ptr<float>(4)[6] = -1e-30f;
-    for (const char* name : {"a.tiff", "a.tif", "a.pfm"}) {
+    for (const char* name : {"a.tiff", "a.tif", "a.pfm", "a.exr", "a.EXR"}) {
       write_map(folder / name, map);
       const cv::Mat again = read_map(folder / name);
       EXPECT_TRUE(same_bits(map, again)) << name;
@@ -120,7 +115,7 @@ TEST(Maps, UnsupportedOnesAreRefused) {
 
 TEST(Maps, WithoutPixelsAreNotWritten) {
   const TemporaryFolder folder;
-  for (const char* name : {"a.pfm", "a.tiff", "a.png", "a.jpg"}) {
+  for (const char* name : {"a.pfm", "a.tiff", "a.exr", "a.png", "a.jpg"}) {
     const std::string error = "Cannot write " + (folder / name).string() + ": the ";
     for (const cv::Mat& empty : {cv::Mat(), cv::Mat(0, 0, CV_32FC1)}) {
       EXPECT_EQ(error_of([&] { write_map(folder / name, empty); }),
@@ -262,7 +257,7 @@ TEST(BadFiles, EveryTruncationIsNoticed) {
           << name << " " << size;
     }
   }
-  for (const char* name : {"m.pfm", "m.tiff"}) {
+  for (const char* name : {"m.pfm", "m.tiff", "m.exr"}) {
     write_map(folder / name, random_map(CV_32FC1));
     const std::string whole = bytes_of(folder / name);
     for (std::size_t size = 0; size < whole.size() * 9 / 10; size += whole.size() / 40) {
@@ -382,6 +377,7 @@ TEST(Writing, NoticesAFullDisk) {
       {"i.bmp", [&](const auto& path) { write_image(path, image); }},
       {"m.tiff", [&](const auto& path) { write_map(path, random_map(CV_32FC3)); }},
       {"m.pfm", [&](const auto& path) { write_map(path, random_map(CV_32FC3)); }},
+      {"m.exr", [&](const auto& path) { write_map(path, random_map(CV_32FC3)); }},
       {"m.png", [&](const auto& path) { write_map(path, random_map(CV_32FC1)); }},
       {"t.txt", [&](const auto& path) { write_text(path, text); }},
       {"c.ply", [&](const auto& path) { write_ply(path, cloud); }}};
