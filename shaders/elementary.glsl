@@ -54,6 +54,11 @@ FN float logarithm(float a) {
   return float(exponent) * 0.693147181f + of_mantissa;
 }
 
+// Of a positive number: 1 over the power of two at or below it.
+FN float inverse_power_of_two(float a) {
+  return uint_as_float((254u << 23) - (float_as_uint(a) & 0x7f800000u));
+}
+
 // exp(a) for |a| <= 80, the nearest of these beyond; to 1e-6 of it.
 FN float exponential(float a) {
   a = clamp(a, -80.0f, 80.0f);

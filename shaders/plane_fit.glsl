@@ -111,11 +111,17 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float cxx = sxx - sx * mx + pull;
   float cxy = sxy - sx * my;
   float cyy = syy - sy * my + pull;
-  float cxr = sxr - sr * mx;
-  float cyr = syr - sr * my;
+  fit.information = vec3(cxx, cxy, cyy);
+  // Weights grow with the square of the points' speed, in whatever unit distances are: products of the sums would
+  // overflow. Powers of two lose no bits.
+  float unit = inverse_power_of_two(s);
+  cxx *= unit;
+  cxy *= unit;
+  cyy *= unit;
+  float cxr = unit * (sxr - sr * mx);
+  float cyr = unit * (syr - sr * my);
   float determinant = cxx * cyy - cxy * cxy;
   if (!(determinant > 1e-9f * cxx * cyy)) return false;
-  fit.information = vec3(cxx, cxy, cyy);
   float turn_x = (cyy * cxr - cxy * cyr) / determinant;
   float turn_y = (cxx * cyr - cxy * cxr) / determinant;
   fit.plane.slope_x = guess.slope_x + turn_x;

@@ -21,7 +21,7 @@ PatchOperations patch_operations(const KernelConstants& constants);
 struct FitOperations {
   int of_neighbour = 71;  ///< in the loop over a row of neighbours
   int of_row = 1;
-  int of_fit = 44;  ///< around both loops, after random numbers
+  int of_fit = 49;  ///< around both loops, after random numbers
 };
 
 /// Neighbours on a side of the grid to which a plane is fitted.

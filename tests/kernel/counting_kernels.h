@@ -37,6 +37,7 @@ inline Number operator*(Number a, Number b) { return counted(a.value * b.value);
 inline Number operator-(Number a) { return -a.value; }
 inline Number& operator+=(Number& a, Number b) { return a = a + b; }
 inline Number& operator-=(Number& a, Number b) { return a = a - b; }
+inline Number& operator*=(Number& a, Number b) { return a = a * b; }
 inline auto operator<=>(Number a, Number b) { return a.value <=> b.value; }
 inline bool operator==(Number a, Number b) { return a.value == b.value; }
 inline Number sqrt(Number a) { return counted(std::sqrt(a.value)); }
@@ -44,6 +45,7 @@ inline Number arc_tangent(Number y, Number x) { return counted(std::atan2(y.valu
 inline Number polar_angle(Number y, Number x) { return arc_tangent(y, x); }
 inline Number abs(Number a) { return std::fabs(a.value); }
 inline Number floor(Number a) { return std::floor(a.value); }
+inline Number inverse_power_of_two(Number a) { return kernel::inverse_power_of_two(a.value); }
 inline Number min(Number a, Number b) { return b < a ? b : a; }
 inline Number max(Number a, Number b) { return a < b ? b : a; }
 inline Number clamp(Number a, Number low, Number high) { return min(max(a, low), high); }
