@@ -3,6 +3,8 @@
 
 // Stands for "not measurable" in maps that a person may read.
 #define UNKNOWN_DIFFERENCE 1000.0f
+// The largest one that is measured: however much planes contradict each other, that is known.
+#define LARGEST_KNOWN_DIFFERENCE 999.0f
 // The displacement (px) that a pixel counts as where it cannot be measured.
 #define UNCHECKED_DISPLACEMENT 1.0f
 
@@ -24,6 +26,6 @@ FN vec2 difference_from_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ra
   vec2 reprojected;
   CameraParameters reference_camera = PARAMETERS.cameras[REFERENCE];
   if (!project(reference_camera, model_of(CONTEXT reference_camera), back, reprojected)) return unknown;
-  return vec2(min(relative, UNKNOWN_DIFFERENCE),
-              min(length(reprojected - vec2(float(pixel.x), float(pixel.y))), UNKNOWN_DIFFERENCE));
+  return vec2(min(relative, LARGEST_KNOWN_DIFFERENCE),
+              min(length(reprojected - vec2(float(pixel.x), float(pixel.y))), LARGEST_KNOWN_DIFFERENCE));
 }

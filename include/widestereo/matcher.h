@@ -40,8 +40,8 @@ struct ViewResult {
   cv::Mat normals;  ///< CV_32FC3, unit, camera frame, facing the camera; 0 where there is no plane
   cv::Mat cost;     ///< CV_32FC1, 1 - ZNCC in [0, 2]
   /// CV_32FC2: relative difference of distance (share) and displacement (pixels) between the
-  /// pixel's point and where the best agreeing source view's own plane puts it; 1000 where that
-  /// cannot be measured.
+  /// pixel's point and where the best agreeing source view's own plane puts it, 999 at most;
+  /// 1000 where that cannot be measured. Of a filled pixel: those of the plane that was rejected.
   cv::Mat differences;
   /// CV_32FC1 in [0, 1]: probability that the pixel's point lies within 2 px of its true place in
   /// the source view, rejected or not; 0 where there is no plane or it was filled.

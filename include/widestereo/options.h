@@ -143,7 +143,7 @@ struct Options {
 
   /// Left-right check: largest relative difference of distance, 0..1000.
   double consistency_relative = 0.02;
-  double consistency_pixels = 1.0;  ///< left-right check: largest displacement, pixels, 0..1000
+  double consistency_pixels = 1.0;  ///< left-right check: largest displacement, pixels, 0..999
   double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2
   /// Pixels between min_distance and max_distance in the source view, 0..10000.
   double min_parallax = 0.5;

@@ -137,8 +137,8 @@ void validate(const Options& o) {
   require_between(o.warm_regressions, 0, 1000, "warm regressions");
   require_between(o.min_texture, 0, 255, "min texture");
   require_between(o.min_visible, 0, 1, "min visible");
-  require_between(o.consistency_relative, 0, 1000, "consistency (relative)");
-  require_between(o.consistency_pixels, 0, 1000, "consistency (pixels)");
+  require_between(o.consistency_relative, 0, 999, "consistency (relative)");
+  require_between(o.consistency_pixels, 0, 999, "consistency (pixels)");
   require_between(o.max_cost, 0, 2, "max cost");
   require_between(o.min_parallax, 0, 10000, "min parallax");
   require_between(o.max_tilt, 0, 90, "max tilt");

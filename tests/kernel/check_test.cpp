@@ -108,7 +108,7 @@ TEST(Checks, RejectFromEachOptionsLimitOn) {
     options.min_texture = options.min_parallax = options.min_support = 0;
     options.max_cost = 2;
     options.max_tilt = 90;
-    options.consistency_relative = options.consistency_pixels = 1000;
+    options.consistency_relative = options.consistency_pixels = 999;
     return options;
   }();
   const Rig rig = fisheye_rig(96);
@@ -438,6 +438,24 @@ TEST(Checks, ABetterMatchElsewhereLiesToEitherSideAndMatchesBetterByTheMargin) {
   for (const double pixels : {-4.0, -2.0, 2.0, 4.0}) {
     EXPECT_GT(share(pixels, 0.5f), 0.9) << pixels << " px";
     EXPECT_EQ(share(pixels, 0.15f), 0) << pixels << " px, less than the margin better";
+  }
+}
+
+TEST(Checks, PlanesThatContradictEachOtherByAnyAmountAreInconsistent) {
+  Rig rig = fisheye_rig(96);
+  for (View& view : rig.views) {
+    view.camera.model = CameraModel::pinhole;
+    view.camera.fx = view.camera.fy = 900;
+    view.world_from_camera.linear().setIdentity();
+  }
+  AgreeingViews views(wide_range(), {0, 0, 0.2}, rig);
+  const ivec2 pixel(48, 48);
+  for (const float nearer : {1.0f, 4.0f, 100.0f}) {  // by 54 and 1,800 pixels
+    const vec3 held = nearer * views.plane(1);
+    views.fixture.view(1).hypotheses.setTo(cv::Scalar(held.x, held.y, held.z, 0.1));
+    const int reasons = views.reasons(pixel);
+    EXPECT_EQ((reasons & REASON_INCONSISTENT) != 0, nearer > 1) << nearer;
+    EXPECT_EQ(reasons & REASON_UNCHECKED, 0) << nearer;
   }
 }
 
