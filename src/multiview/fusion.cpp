@@ -39,14 +39,19 @@ ViewCloud cloud_of(const View& view, const ViewMaps& maps) {
   const cv::Mat rays = ray_image(view.camera, view.mask);
   require_cloud_maps(maps.distance, rays, maps.normals, maps.image, maps.confidence,
                      " of " + view.name);
-  cloud.points = make_point_cloud(maps.distance, rays, maps.normals, maps.image, maps.confidence,
+  cv::Mat distance = maps.distance.clone();
+  for (int i = 0; i < static_cast<int>(distance.total()); ++i) {
+    const cv::Point pixel(i % distance.cols, i / distance.cols);
+    if (rays.at<cv::Vec4f>(pixel)[3] == 0) distance.at<float>(pixel) = 0;  // excluded
+  }
+  cloud.points = make_point_cloud(distance, rays, maps.normals, maps.image, maps.confidence,
                                   view.world_from_camera);
   cloud.points.shrink_to_fit();
-  cloud.index.create(maps.distance.size(), CV_32SC1);
+  cloud.index.create(distance.size(), CV_32SC1);
   int count = 0;
   for (int y = 0; y < cloud.index.rows; ++y) {
     for (int x = 0; x < cloud.index.cols; ++x) {
-      const bool has = has_point(maps.distance.at<float>(y, x), rays.at<cv::Vec4f>(y, x));
+      const bool has = has_point(distance.at<float>(y, x), rays.at<cv::Vec4f>(y, x));
       cloud.index.at<int>(y, x) = has ? count++ : no_point;
     }
   }

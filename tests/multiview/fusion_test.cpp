@@ -72,6 +72,17 @@ TEST_F(Fusion, ViewsOfOneSurfaceBecomeOneLayerOfPointsOnIt) {
   EXPECT_LT(largest, 1e-5);
 }
 
+TEST_F(Fusion, WhatMasksExcludeIsNoPointOfTheirViews) {
+  FusionOptions options;
+  options.min_views = 1;
+  const cv::Mat nothing = cv::Mat::zeros(side, side, CV_8UC1);
+  views_[0].mask = views_[2].mask = nothing;
+  EXPECT_EQ(fuse_all(options).size(),
+            static_cast<std::size_t>(cv::countNonZero(maps_[1].distance > 0)));
+  views_[1].mask = nothing;
+  EXPECT_TRUE(fuse_all(options).empty());
+}
+
 TEST_F(Fusion, PointsOfOneViewAloneNeedToBeAskedFor) {
   maps_[1].distance = maps_[2].distance = cv::Mat::zeros(side, side, CV_32FC1);
   EXPECT_TRUE(fuse_all().empty());
