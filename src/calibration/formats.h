@@ -16,7 +16,8 @@ struct Document {
   std::filesystem::path path;
   std::string text;
 
-  bool contains(const char* words) const { return text.find(words) != std::string::npos; }
+  /// Outside comments.
+  bool contains(const char* words) const;
 
   /// Error whose message begins with the file's name.
   [[noreturn]] void fail(const std::string& what) const;
@@ -51,6 +52,10 @@ void set_matrix(Camera& camera, const Document& document, const std::string& wha
 
 /// The same camera in a simpler model, where what a rational or thin prism model has more is 0.
 Camera simplified(Camera camera);
+
+/// Throws Error unless this is the last row of a 4x4 transform. `what` names it.
+void require_last_row(const Document& document, const std::string& what,
+                      const Eigen::RowVector4d& row);
 
 /// The rotation nearest to a matrix (orthonormal but for rounding) and a translation as a rigid
 /// motion; fails when they are not one.

@@ -215,10 +215,10 @@ class Reader {
 
   /// Of the camera, to world; the file's cameras look along -z, with y up.
   Eigen::Isometry3d pose_of(const Json& frame, std::size_t i) const {
-    Eigen::Matrix<double, 3, 4> matrix;
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
     const Json rows = frame.value("transform_matrix", Json());
-    bool complete = rows.is_array() && rows.size() >= 3;
-    for (int y = 0; complete && y < 3; ++y) {
+    bool complete = rows.is_array() && (rows.size() == 3 || rows.size() == 4);
+    for (int y = 0; complete && y < static_cast<int>(rows.size()); ++y) {
       complete = rows[y].is_array() && rows[y].size() == 4;
       for (int x = 0; complete && x < 4; ++x) {
         complete = rows[y][x].is_number();
@@ -227,8 +227,10 @@ class Reader {
     }
     if (!complete) fail(i, "\"transform_matrix\" (4x4) is missing.");
     const Eigen::Matrix3d axes = Eigen::Vector3d(1, -1, -1).asDiagonal();
-    return rigid(document_, "The transform_matrix of frame " + std::to_string(i),
-                 matrix.leftCols<3>() * axes, matrix.col(3));
+    const std::string what = "The transform_matrix of frame " + std::to_string(i);
+    require_last_row(document_, what, matrix.row(3));
+    return rigid(document_, what, matrix.topLeftCorner<3, 3>() * axes,
+                 matrix.topRightCorner<3, 1>());
   }
 
   Document document_;

@@ -164,7 +164,10 @@ Camera camera_of(const OCamLens& lens, int width, int height, const Document& do
   return camera;
 }
 
-bool is_ocam(const Document& document) { return document.contains("ocam_model"); }
+/// It is named in comments; all else is numbers.
+bool is_ocam(const Document& document) {
+  return document.text.find("ocam_model") != std::string::npos && !document.contains(":");
+}
 
 Rig read_ocam(const Document& document) {
   const std::vector<std::vector<double>> lines = lines_of_numbers(document);
@@ -192,7 +195,10 @@ Rig read_ocam(const Document& document) {
   return rig;
 }
 
-bool is_omnimvs(const Document& document) { return document.contains("inv_poly:"); }
+bool is_omnimvs(const Document& document) {
+  return document.contains("inv_poly:") ||
+         (document.contains("cameras:") && document.contains("poly:"));
+}
 
 Rig read_omnimvs(const Document& document) {
   Rig rig;

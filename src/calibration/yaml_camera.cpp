@@ -172,6 +172,10 @@ Eigen::Isometry3d YamlCamera::motion(const char* key) const {
   if (values.size() != 12 && values.size() != 16) {
     fail(std::string("The key ") + key + " must be a 4x4 matrix.");
   }
+  if (values.size() == 16) {
+    require_last_row(document_, name_ + ": " + key,
+                     Eigen::Map<const Eigen::RowVector4d>(values.data() + 12));
+  }
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(values.data());
   return rigid(document_, name_ + ": " + key, matrix.leftCols<3>(), matrix.col(3));
 }

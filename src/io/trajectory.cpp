@@ -45,13 +45,25 @@ bool is_comma_separated(const std::string& line) {
   return after != std::string::npos && line[after] == ',';
 }
 
-/// The eighth column's name ends in w, before its unit: the quaternion is x y z w.
-bool names_w_last(const std::string& header) {
-  const std::vector<std::string> names = words_of(header, true);
+/// Whether a column's name ends in w, before its unit; columns count from 0.
+bool names_w(const std::vector<std::string>& names, std::size_t column) {
   if (names.size() < numbers_of_pose) return false;
-  const std::string& last = names[numbers_of_pose - 1];
-  const std::string name = trimmed(last.substr(0, last.find('[')));
+  const std::string name = trimmed(names[column].substr(0, names[column].find('[')));
   return !name.empty() && (name.back() == 'w' || name.back() == 'W');
+}
+
+/// Throws Error where the header names the quaternion's w in another place than it is looked for.
+void require_order_of(const std::string& header, bool comma_separated, const std::string& name) {
+  constexpr std::size_t first_of_quaternion = 4, last = numbers_of_pose - 1;
+  const std::size_t begin = header.find_first_not_of("# \t\r");
+  if (begin == std::string::npos) return;
+  const std::vector<std::string> names = words_of(header.substr(begin), comma_separated);
+  if (comma_separated && names_w(names, last)) {
+    throw Error(name + " names the quaternion's w last; write qw,qx,qy,qz.");
+  }
+  if (!comma_separated && names_w(names, first_of_quaternion)) {
+    throw Error(name + " names the quaternion's w first; write qx qy qz qw.");
+  }
 }
 
 /// How all lines of a file hold poses, told by its first one.
@@ -146,9 +158,7 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
     }
     if (!layout) {
       layout.emplace(line.substr(first));
-      if (layout->comma_separated() && names_w_last(header)) {
-        throw Error(path.string() + " names the quaternion's w last; write qw,qx,qy,qz.");
-      }
+      if (!header.empty()) require_order_of(header, layout->comma_separated(), path.string());
     }
     trajectory.poses.push_back(
         layout->pose(line, path.string() + " line " + std::to_string(number)));
@@ -192,13 +202,17 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
                   " is earlier than the one before it, but frames without time stamps take poses "
                   "in their order; sort the file by time.");
     }
-    for (const std::size_t i : chosen) poses.push_back(trajectory[i].world_from_body);
+    for (const std::size_t i : chosen) {
+      require_number(i, frames.size(), "frame", "The sequence");
+      poses.push_back(trajectory[i].world_from_body);
+    }
     return poses;
   }
   if (trajectory.empty()) throw Error("There are no poses in " + name + ".");
   std::stable_sort(trajectory.begin(), trajectory.end(), is_earlier);
   require_one_pose_a_time(trajectory, name);
   for (const std::size_t i : chosen) {
+    require_number(i, frames.size(), "frame", "The sequence");
     const SequenceFrame& frame = frames[i];
     const double seconds = static_cast<double>(*frame.nanoseconds) * 1e-9;
     const auto apart = [seconds](const StampedPose& pose) {

@@ -195,6 +195,21 @@ TEST(Kalibr, ReadsFilesWithOpenCvsHeader) {
   EXPECT_EQ(read_calibration(folder.write("openvins.yaml", text)).rig.views.size(), 2u);
 }
 
+TEST(Kalibr, CommentsMayNameOtherFormats) {
+  const TemporaryFolder folder;
+  for (const char* words :
+       {"ocam_model", "Camera.type", "inv_poly:", "cam0_calib", "(opencv-matrix)",
+        "\"radial_poly\"", "model_type: KANNALA_BRANDT projection_parameters"}) {
+    for (const std::string& comment :
+         {"# as in " + std::string(words) + "\n", "x: 1 # as in " + std::string(words) + "\n"}) {
+      const Calibration read =
+          read_calibration(folder.write("chain.yaml", comment + std::string(kalibr_text)));
+      EXPECT_EQ(read.format, CalibrationFormat::kalibr) << comment;
+      EXPECT_EQ(read.rig.views.size(), 2u) << comment;
+    }
+  }
+}
+
 TEST(Kalibr, ReadsWhereTheImuIs) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& text) {
@@ -808,6 +823,10 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect(replaced(kalibr_text, "resolution: [512, 512]", "resolution: [512.5, 512]"), "resolution");
   expect(replaced(kalibr_text, "T_cn_cnm1", "T_cam_imu"), "T_cn_cnm1");
   expect(replaced(kalibr_text, "0.9999994457734953", "1.2"), "rigid");
+  for (const char* last : {"[0.1, 0.0, 0.0, 1.0]", "[0.0, 0.0, 0.0, 2.0]"}) {
+    expect(replaced(with_imu("cam0", "T_cam_imu"), "[0.0, 0.0, 0.0, 1.0]", last),
+           "cam0: T_cam_imu must end with the row 0 0 0 1; it may be transposed");
+  }
   expect(replaced(with_imu("cam0", "T_cam_imu"), "[1.0, 0.0, 0.0, -0.04]", "[1.1, 0.0, 0.0, 0.0]"),
          "cam0: T_cam_imu is not a rigid motion");
   expect(replaced(with_imu("cam1", "T_imu_cam"), "-0.04", ".nan"), "cam1: The key T_imu_cam");

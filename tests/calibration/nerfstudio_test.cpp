@@ -180,6 +180,9 @@ TEST_F(Nerfstudio, WhatIsMissingIsNamed) {
   expect(file(fisheye, R"({"file_path": "a.png", "transform_matrix":
                 [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})"),
          "rigid");
+  expect(file(fisheye, R"({"file_path": "a.png", "transform_matrix":
+                [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [1, 2, 3, 1]]})"),
+         "The transform_matrix of frame 0 must end with the row 0 0 0 1");
   expect(file(R"("w": 9, "h": 9)", frame("a.png")), "fl_x");
   expect(file(R"("fl_x": 9, "h": 9)", frame("a.png")), "\"w\"");
   expect(file(R"("fl_x": 900, "w": 1919.9, "h": 1080)", frame("a.png")), "1919.9x1080");

@@ -172,6 +172,12 @@ TEST_F(OCam, ReadsRigsOfOmniMvs) {
   EXPECT_LT((second.linear().col(2) - Vector3d::UnitX()).norm(), 1e-12);
   EXPECT_LT((second.linear().col(1) - Vector3d::UnitY()).norm(), 1e-12);
   const std::string good = omnimvs();
+  std::string without_inverse = good;
+  const std::string inverse = "    inv_poly: [4, 611.433, 386.965, -15.0504, -65.1466]\n";
+  for (std::size_t at = 0; (at = without_inverse.find(inverse)) != std::string::npos;) {
+    without_inverse.erase(at, inverse.size());
+  }
+  EXPECT_EQ(read(without_inverse, CalibrationFormat::omnimvs).rig.views.size(), 4u);
   EXPECT_THAT(error(replaced(good, "\"ocam\"", "\"omni\"")), HasSubstr("cam0: The model \"omni\""));
   EXPECT_THAT(error(replaced(good, "5,\n", "6,\n")), HasSubstr("cam0: The key poly"));
   EXPECT_THAT(error(replaced(good, "pose:", "poses:")), HasSubstr("cam0: The key pose"));

@@ -354,6 +354,9 @@ TEST_F(Trajectories, BrokenLinesAreNamed) {
   }
   EXPECT_THAT(error_of_text("1 2 3,4 4 0 0 0 1\n"), HasSubstr("line 1"));
   EXPECT_THAT(error_of_text("1 2 3 4 1 1 0 1\n"), HasSubstr("quaternion"));
+  EXPECT_EQ(error_of_text("# timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n"), "");
+  EXPECT_THAT(error_of_text("# timestamp tx ty tz qw qx qy qz\n1 2 3 4 1 0 0 0\n"),
+              HasSubstr("poses.txt names the quaternion's w first; write qx qy qz qw."));
 }
 
 TEST_F(Trajectories, BrokenLinesOfGroundTruthAreNamed) {
@@ -394,6 +397,8 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   }
   std::vector<SequenceFrame> frames(3);
   EXPECT_EQ(poses_of_frames(frames, {0, 2}, trajectory, 0.01, "p")[1].translation().x(), 2);
+  EXPECT_THAT(error_of([&] { poses_of_frames(frames, {3}, trajectory, 0.01, "p"); }),
+              HasSubstr("The sequence has no frame number 3 among its 3"));
   frames.pop_back();
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, trajectory, 0.01, "p"); }),
               HasSubstr("3 poses for 2 frames"));
