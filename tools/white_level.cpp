@@ -20,8 +20,7 @@ cv::Mat WhiteLevel::read(const std::filesystem::path& file) const {
   const cv::Mat image = ws::read_image(file);
   if (value_ > 0) return ws::stretched(image, value_, file.string());
   if (told_ || image.depth() != CV_16U) return image;
-  double brightest = 0;
-  cv::minMaxLoc(image.reshape(1), nullptr, &brightest);
+  const double brightest = ws::largest_value(image);
   if (brightest > of_12_bits) return image;
   told_ = true;
   say(file.string() + " has 16 bits, but no value above " + std::to_string(cvRound(brightest)) +

@@ -11,6 +11,9 @@ namespace widestereo {
 /// damaged, no image, of another type).
 cv::Mat read_image(const std::filesystem::path& path);
 
+/// Of an image's grey or colour channels, not of its alpha; 0 where it is empty.
+double largest_value(const cv::Mat& image);
+
 /// The 16-bit image of a camera with fewer bits, whose values end at `white` (4095 where it has
 /// 12), stretched to all of the 16. Throws Error for empty images and those of 8 bits, for values
 /// above, and where `white` is not positive; `name` begins the message.

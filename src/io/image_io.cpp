@@ -196,6 +196,19 @@ cv::Mat read_image(const fs::path& path) {
   return image;
 }
 
+double largest_value(const cv::Mat& image) {
+  double largest = 0;
+  const int colours = image.empty() ? 0 : std::min(image.channels(), 3);
+  for (int channel = 0; channel < colours; ++channel) {
+    cv::Mat values;
+    cv::extractChannel(image, values, channel);
+    double of_channel = 0;
+    cv::minMaxLoc(values, nullptr, &of_channel);
+    largest = std::max(largest, of_channel);
+  }
+  return largest;
+}
+
 cv::Mat stretched(const cv::Mat& image, int white, const std::string& name) {
   require_pixels(image, name);
   if (white < 1) {
@@ -205,8 +218,7 @@ cv::Mat stretched(const cv::Mat& image, int white, const std::string& name) {
   if (image.depth() != CV_16U) {
     throw Error(name + " has no 16 bits, so that its white is known; leave the white level out.");
   }
-  double brightest = 0;
-  cv::minMaxLoc(image.reshape(1), nullptr, &brightest);
+  const double brightest = largest_value(image);
   if (brightest > white) {
     throw Error(name + " has the value " + std::to_string(cvRound(brightest)) +
                 ", above the white level " + std::to_string(white) + "; give a higher one.");

@@ -192,6 +192,10 @@ TEST(Images, OfFewerBitsAreStretched) {
   EXPECT_TRUE(same_bits(result, expected));
   EXPECT_EQ(stretched(cv::Mat(2, 2, CV_16UC3, cv::Scalar::all(255)), 255, "x").at<ushort>(1, 5),
             65535);
+  EXPECT_EQ(stretched(cv::Mat(2, 2, CV_16UC4, cv::Scalar(0, 4095, 0, 65535)), 4095, "x")
+                .at<cv::Vec4w>(1, 1),
+            cv::Vec4w(0, 65535, 0, 65535))
+      << "an opaque alpha is no brightness";
   EXPECT_NE(error_of([&] {
               stretched(of_12_bits, 1023, "dark.png");
             }).find("dark.png has the value 4095, above the white level 1023"),
