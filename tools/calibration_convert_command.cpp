@@ -5,6 +5,7 @@
 
 #include "calibration_commands.h"
 #include "calibration_output.h"
+#include "option_checks.h"
 #include "rig_settings.h"
 #include "widestereo/calibration.h"
 
@@ -19,7 +20,7 @@ struct ConvertArguments {
 
 void convert(const ConvertArguments& arguments) {
   const ws::Rig rig = ws::read_calibration(arguments.input).rig;
-  arguments.output.require_other_than(arguments.input);
+  require_other_file(arguments.output.file, {arguments.input});
   arguments.output.write(rig);
   std::cout << "Wrote " << arguments.output.file << "\n";
 }

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration_output.h"
 
-#include <filesystem>
-
 #include "widestereo/calibration.h"
-#include "widestereo/error.h"
 #include "widestereo/files.h"
 
 namespace ws = widestereo;
@@ -13,12 +10,6 @@ void CalibrationOutput::add_format_to(CLI::App& command) {
   command.add_option("--to", format, "kalibr or basalt")
       ->check(CLI::IsMember({"kalibr", "basalt"}))
       ->capture_default_str();
-}
-
-void CalibrationOutput::require_other_than(const std::string& calibration) const {
-  std::error_code missing;
-  if (!std::filesystem::equivalent(calibration, file, missing)) return;
-  throw ws::Error(file + " is the calibration that is read; choose another file to write.");
 }
 
 void CalibrationOutput::require_form(const ws::Rig& rig) const { (void)text(rig); }

@@ -12,8 +12,6 @@ struct CalibrationOutput {
 
   /// Adds --to.
   void add_format_to(CLI::App& command);
-  /// Throws Error where the file is the calibration that is read: its format may hold more.
-  void require_other_than(const std::string& calibration) const;
   /// Throws Error where write() would for the rig, not for the file.
   void require_form(const widestereo::Rig& rig) const;
   /// As write_kalibr() or write_basalt() does.

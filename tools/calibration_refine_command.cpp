@@ -8,10 +8,12 @@
 
 #include "calibration_commands.h"
 #include "calibration_output.h"
+#include "option_checks.h"
 #include "rig_settings.h"
 #include "say.h"
 #include "text/json_text.h"
 #include "white_level.h"
+#include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/image_io.h"
@@ -122,8 +124,19 @@ void print(const ws::RigRefinement& refined, const std::vector<ws::ViewMatches>&
   }
 }
 
+/// --max-theta is of one run.
+ws::Rig with_limits_of(const ws::Rig& calibrated, ws::Rig rig) {
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    rig.views[i].camera.max_theta = calibrated.views[i].camera.max_theta;
+  }
+  return rig;
+}
+
 void refine(const RefineArguments& arguments) {
-  const ws::Rig rig = arguments.rig.whole_rig(ws::read_image(arguments.images.front()).size());
+  const cv::Size size = ws::read_image(arguments.images.front()).size();
+  const ws::Rig calibrated = ws::read_calibration(arguments.rig.calibration, size).rig;
+  ws::Rig rig = calibrated;
+  arguments.rig.limit_fields_of_view(rig);
   const std::size_t count = rig.views.size();
   if (count < 2 || arguments.images.size() % count != 0) {
     throw ws::Error(arguments.rig.calibration + " has " + std::to_string(count) +
@@ -131,13 +144,15 @@ void refine(const RefineArguments& arguments) {
                     " image(s); give one image of each camera, frame after frame, of two cameras "
                     "or more.");
   }
-  arguments.output.require_other_than(arguments.rig.calibration);
+  std::vector<std::string> read = arguments.images;
+  read.push_back(arguments.rig.calibration);
+  require_other_file(arguments.output.file, read);
   ws::require_writable(arguments.output.file);
   arguments.output.require_form(rig);  // before the work of matching
   const std::vector<ws::ViewMatches> pairs =
       match_frames(rig, arguments.images, arguments.white_level);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);
-  arguments.output.write(refined.rig);
+  arguments.output.write(with_limits_of(calibrated, refined.rig));
   if (arguments.as_json) {
     nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
     json.update(to_json(refined, pairs));

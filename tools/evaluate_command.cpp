@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "option_checks.h"
+#include "result_folder.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -21,6 +22,7 @@ struct EvaluateArguments {
   std::string set;
   std::string truth, valid, occlusion, truth_normals, image, field_of_view, calibration;
   int view = 0, source = 1;
+  double png_scale = FolderFormat::usual_png_scale;
   double far_distance = 0;  ///< metres, 0: do not score what has no ground truth
   std::string error_map;
   bool as_json = false;
@@ -47,7 +49,7 @@ void take_from_set(EvaluateArguments& a) {
   take(a.truth, "depth" + n + ".tiff");
   take(a.valid, "valid" + n + ".png");
   take(a.occlusion, "occ" + n + "_" + std::to_string(a.source) + ".png");
-  take(a.occlusion, "occ" + n + ".png");
+  if (a.view + a.source == 1) take(a.occlusion, "occ" + n + ".png");  // of a pair
   take(a.truth_normals, "normal" + n + ".tiff");
   take(a.image, "cam" + n + ".png");
   take(a.field_of_view, "fov" + n + ".png");
@@ -60,6 +62,11 @@ void run_evaluate(EvaluateArguments a) {
   if (!a.set.empty()) take_from_set(a);
   if (a.truth.empty() || a.calibration.empty()) {
     throw ws::Error("Give --truth and --calibration, or a folder with both by --set.");
+  }
+  if (!a.error_map.empty()) {
+    require_other_file(a.error_map,
+                       {a.prediction, a.normals, a.confidence, a.truth, a.valid, a.occlusion,
+                        a.truth_normals, a.image, a.field_of_view, a.calibration});
   }
   ws::GroundTruth truth;
   truth.distance = ws::read_map(a.truth);
@@ -76,7 +83,7 @@ void run_evaluate(EvaluateArguments a) {
     }
     truth.field_of_view = read_labels(a.field_of_view);
   }
-  const cv::Mat prediction = ws::read_map(a.prediction);
+  const cv::Mat prediction = ws::read_map(a.prediction, a.png_scale);
   const cv::Mat normals = a.normals.empty() ? cv::Mat() : ws::read_map(a.normals);
   const ws::Rig rig = ws::read_calibration(a.calibration, prediction.size()).rig;
   const int views = static_cast<int>(rig.views.size());
@@ -119,10 +126,9 @@ void run_evaluate(EvaluateArguments a) {
 void add_evaluate_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("evaluate", "Score a distance map against ground truth");
   auto a = std::make_shared<EvaluateArguments>();
-  command
-      ->add_option("prediction", a->prediction,
-                   "Distance map: .tiff, .exr, .pfm or 16-bit .png in mm")
+  command->add_option("prediction", a->prediction, "Distance map: .tiff, .exr, .pfm or 16-bit .png")
       ->required();
+  add_png_scale_of_input(*command, a->png_scale);
   command->add_option("--normals", a->normals, "Normal map to score as well");
   command->add_option(
       "--confidence", a->confidence,

@@ -61,15 +61,19 @@ void require_no_validation_messages(const ws::Device& device) {
                   " message(s) of the Vulkan validation layers; the first: " + messages.front());
 }
 
-void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
+bool is_blank(const cv::Mat& image, const cv::Mat& mask) {
   constexpr double noise = 4;  // grey levels, of black pixels
+  double darkest = 0;
+  double brightest = 0;
+  cv::minMaxLoc(ws::to_grey_levels(image, "The image"), &darkest, &brightest, nullptr, nullptr,
+                mask);
+  return brightest - darkest <= noise;
+}
+
+void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     const ws::View& view = rig.views[i];
-    double darkest = 0;
-    double brightest = 0;
-    cv::minMaxLoc(ws::to_grey_levels(images[i], "The image of " + view.name), &darkest, &brightest,
-                  nullptr, nullptr, view.mask);
-    if (brightest - darkest > noise) continue;
+    if (!is_blank(images[i], view.mask)) continue;
     say("The image of " + view.name + " is blank but for noise; check its camera and lens.");
   }
 }

@@ -2,8 +2,12 @@
 #include "option_checks.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "text/number.h"
+#include "widestereo/error.h"
+
+namespace ws = widestereo;
 
 namespace {
 
@@ -48,6 +52,14 @@ CLI::Validator non_negative_number() {
                                                              : word + " is no number from 0 on";
       },
       "NONNEGATIVE");
+}
+
+void require_other_file(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code missing;
+    if (!std::filesystem::equivalent(input, output, missing)) continue;
+    throw ws::Error(output + " is among the files that are read; choose another file to write.");
+  }
 }
 
 void check_words_of(CLI::App& app) {

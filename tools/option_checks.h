@@ -30,6 +30,9 @@ CLI::Validator name_among(const std::vector<std::pair<std::string, Value>>& name
       list);
 }
 
+/// Throws Error where a file to be written is one of those that are read.
+void require_other_file(const std::string& output, const std::vector<std::string>& inputs);
+
 /// Makes every option, of subcommands too, refuse an empty word, and where it takes numbers NaN and
 /// infinity, and read whole numbers by their decimal digits.
 void check_words_of(CLI::App& app);

@@ -116,6 +116,8 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
           {"mask", absolute_paths(a.images.rig.masks)},
           {"masks", absolute_path(a.images.masks)},
           {"white_level", a.images.white_level.value()},
+          {"max_image_size", a.images.size.value()},
+          {"max_theta", a.images.rig.max_theta},
           {"sources", std::max(sources_of(a), groups.front().size() - 1)},
           {"clouds", !a.format.no_cloud},
           {"pictures", !a.format.no_pictures},
@@ -322,6 +324,7 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   std::printf("%.0f images, %.1f %% accepted on average; %zu points in %s\n", count,
               100 * accepted / count, record["cloud"]["points"].get<std::size_t>(),
               (reconstruction.folders().folder() / "cloud.ply").string().c_str());
+  report_little_accepted(accepted / count, "the poses (of the camera in the world, or of the IMU)");
 }
 
 }  // namespace

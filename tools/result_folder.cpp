@@ -39,20 +39,39 @@ double share_of_usable(const ws::ViewResult& view, const cv::Mat& pixels) {
 
 constexpr const char* group = "Output";
 
-/// Removes what the record of an earlier run names, nothing else. The record goes first: without it
-/// the folder is not complete.
-void remove_earlier_result(const fs::path& folder) {
+/// Files of an earlier run, the record first; none where the folder holds no result.
+std::vector<std::string> earlier_files(const fs::path& folder) {
   const Json record = record_in(folder);
   if (!record.is_object() || !record.value("program", Json()).is_string() ||
       !record["program"].get<std::string>().starts_with("widestereo ")) {
-    return;
+    return {};
   }
   std::vector<std::string> files = {result_record};
   for (const std::string& file : files_of(record)) {
     // Someone may have edited it.
     if (!fs::path(file).has_parent_path()) files.push_back(file);
   }
+  return files;
+}
+
+/// Throws Error where something that is no file of an earlier run has a name of the new ones.
+void require_no_other_files(const fs::path& folder, const Json& record) {
+  const std::vector<std::string> earlier = earlier_files(folder);
+  std::vector<std::string> files = files_of(record);
+  files.emplace_back(result_record);
   for (const std::string& file : files) {
+    if (std::find(earlier.begin(), earlier.end(), file) != earlier.end()) continue;
+    if (!fs::exists(fs::symlink_status(folder / file))) continue;
+    throw ws::Error((folder / file).string() +
+                    " is there already and is not of an earlier run; move it, or choose another "
+                    "folder.");
+  }
+}
+
+/// Removes what the record of an earlier run names, nothing else. The record goes first: without it
+/// the folder is not complete.
+void remove_earlier_result(const fs::path& folder) {
+  for (const std::string& file : earlier_files(folder)) {
     std::error_code error;
     fs::remove(folder / file, error);
     if (error) {
@@ -258,12 +277,13 @@ double accepted_share(const std::vector<ws::ViewResult>& views) {
   return share;
 }
 
-void report_little_accepted(double share) {
+void report_little_accepted(double share, const std::string& first_cause) {
   constexpr double little = 0.4;  // pairs that fit have half or more (docs/accuracy.md)
   if (share >= little) return;
-  std::puts(
-      "Little was accepted: check the order of the images, the calibration and its unit, and the "
-      "range of distances (`widestereo calibration check`).");
+  std::printf(
+      "Little was accepted: check %s, the calibration and its unit, and the range of distances "
+      "(`widestereo calibration check`).\n",
+      first_cause.c_str());
 }
 
 void FolderFormat::add_maps_to(CLI::App& command) {
@@ -276,6 +296,12 @@ void FolderFormat::add_maps_to(CLI::App& command) {
       ->check(positive_number())
       ->capture_default_str()
       ->group(group);
+}
+
+void add_png_scale_of_input(CLI::App& command, double& scale) {
+  command.add_option("--png-scale", scale, "Units per metre of a 16-bit PNG of distances")
+      ->check(positive_number())
+      ->capture_default_str();
 }
 
 void FolderFormat::add_to(CLI::App& command) {
@@ -356,6 +382,7 @@ Json write_result_folder(const fs::path& folder, const FolderContents& contents,
   }
   if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
   ws::write_text(unfinished.path() / result_record, ws::to_text(record) + "\n");
+  require_no_other_files(folder, record);
   remove_earlier_result(folder);
   move_result(unfinished.path(), folder, record);
   return record;

@@ -50,9 +50,12 @@ double accepted_share(const widestereo::ViewResult& view);
 /// The mean of the views.
 double accepted_share(const std::vector<widestereo::ViewResult>& views);
 
+/// Adds --png-scale of a distance map that is read.
+void add_png_scale_of_input(CLI::App& command, double& scale);
+
 /// Says what to check where so little is accepted of all views that the images hardly fit their
 /// calibration.
-void report_little_accepted(double share);
+void report_little_accepted(double share, const std::string& first_cause);
 
 struct FolderContents {
   const widestereo::Rig& rig;

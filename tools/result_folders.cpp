@@ -111,6 +111,14 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
   record_[kind_.results] = before[kind_.results];
 }
 
+void ResultFolders::keep(const Json& kept) {
+  for (const Json& result : results()) {
+    if (std::find(kept.begin(), kept.end(), result) != kept.end()) continue;
+    obsolete_.push_back(result["name"].get<std::string>());
+  }
+  record_[kind_.results] = kept;
+}
+
 bool ResultFolders::is_of_this_kind(const Json& record) const {
   const Json whose = record.is_object() ? record.value("input", Json()) : Json();
   return whose.is_object() && whose.value("run", Json()) == Json(kind_.name);

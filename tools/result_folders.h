@@ -40,8 +40,9 @@ class ResultFolders {
   const Json& record() const { return record_; }
   /// Records of the finished results, in the order in which they were added.
   const Json& results() const { return record_[kind_.results]; }
-  /// Forgets those results that are not among `kept`.
-  void keep(Json kept) { record_[kind_.results] = std::move(kept); }
+  /// Forgets those results that are not among `kept`: they are removed as soon as there is a new
+  /// one.
+  void keep(const Json& kept);
   /// Whether all files of the result that a record is about are still there.
   bool is_there(const Json& result) const;
   /// `record`: of a result.

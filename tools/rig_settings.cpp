@@ -38,12 +38,6 @@ void RigSettings::add_to(CLI::App& command, const std::string& or_other, const s
       ->delimiter(',');
 }
 
-ws::Rig RigSettings::whole_rig(cv::Size size) const {
-  ws::Rig rig = ws::read_calibration(calibration, size).rig;
-  limit_fields_of_view(rig);
-  return rig;
-}
-
 ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) const {
   const ws::Rig all = ws::read_calibration(calibration, size).rig;
   std::vector<int> chosen = views;

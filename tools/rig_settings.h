@@ -32,8 +32,6 @@ struct RigSettings {
   /// Adds these and --views; `which`: what cameras it names or may leave out.
   void add_to(CLI::App& command, const std::string& or_other = "",
               const std::string& which = ", one for each image");
-  /// All calibrated views, with masks; `size` of the first image.
-  widestereo::Rig whole_rig(cv::Size size) const;
   /// The calibrated views of `image_count` images, in their order, with masks; `size` of the first
   /// image.
   widestereo::Rig rig_for_images(std::size_t image_count, cv::Size size) const;

@@ -76,6 +76,19 @@ std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame, const WhiteLeve
   return images;
 }
 
+/// The first frame without a blank image, as cameras that are just starting give; else the first.
+const ws::SequenceFrame& first_with_content(const std::vector<ws::SequenceFrame>& frames,
+                                            const WhiteLevel& white_level) {
+  for (const ws::SequenceFrame& frame : frames) {
+    const std::vector<cv::Mat> images = read_images(frame, white_level);
+    if (std::none_of(images.begin(), images.end(),
+                     [](const cv::Mat& image) { return is_blank(image, cv::Mat()); })) {
+      return frame;
+    }
+  }
+  return frames.front();
+}
+
 /// A frame's images as they are matched; throws Error unless they have the calibrated sizes.
 std::vector<cv::Mat> reduced(std::vector<cv::Mat> images, const ws::SequenceFrame& frame,
                              const ws::Rig& calibrated, const SizeSettings& size) {
@@ -99,13 +112,14 @@ Selection select_frames(const SequenceArguments& a) {
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
-  const ws::SequenceFrame& start = selection.frames.front();
+  const ws::SequenceFrame& start = first_with_content(selection.frames, a.white_level);
   const std::vector<cv::Mat> images = read_images(start, a.white_level);
   selection.calibrated = a.rig.rig_for_images(cameras.size(), images.front().size());
   selection.rig = selection.calibrated;
   for (ws::View& view : selection.rig.views) view = a.size.reduced(view);
   const std::vector<cv::Mat> first = reduced(images, start, selection.calibrated, a.size);
-  // The first frame alone decides, so that more frames may follow later.
+  report_blank_images(selection.rig, first);
+  // The first frame that shows anything decides alone, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);
   selection.blurs = a.sharpness.blurs(selection.rig, first);
   if (a.poses.given()) {
@@ -376,7 +390,8 @@ void run_sequence(const SequenceArguments& arguments) {
   summarise(run.folder().frames(), true);
   double accepted = 0;
   for (const Json& frame : run.folder().frames()) accepted += frame["accepted"].get<double>();
-  report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()));
+  report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()),
+                         "the order of the cameras");
 }
 
 }  // namespace

@@ -22,6 +22,9 @@ class SizeSettings {
   cv::Mat reduced(const cv::Mat& image, const widestereo::View& calibrated,
                   const std::string& name) const;
 
+  /// Largest width and height, pixels; 0 = as large as they are.
+  int value() const { return largest_side_; }
+
  private:
   cv::Size size_of(const widestereo::Camera& camera) const;
 

@@ -4,7 +4,9 @@
 #include <string>
 
 #include "commands.h"
+#include "option_checks.h"
 #include "pose_settings.h"
+#include "result_folder.h"
 #include "rig_settings.h"
 #include "size_settings.h"
 #include "white_level.h"
@@ -19,6 +21,7 @@ namespace {
 struct SynthesisArguments {
   std::string distance, image, other;
   std::string picture;
+  double png_scale = FolderFormat::usual_png_scale;
   RigSettings rig;
   PoseSettings poses;
   SizeSettings size;
@@ -27,11 +30,14 @@ struct SynthesisArguments {
 };
 
 void run_synthesis(const SynthesisArguments& a) {
+  if (!a.picture.empty()) {
+    require_other_file(a.picture, {a.distance, a.image, a.other, a.rig.calibration});
+  }
   cv::Mat image = ws::to_grey_levels(a.white_level.read(a.image), a.image);
   cv::Mat other = ws::to_grey_levels(a.white_level.read(a.other), a.other);
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
-  const cv::Mat distance = ws::read_map(a.distance);
+  const cv::Mat distance = ws::read_map(a.distance, a.png_scale);
   image = a.size.reduced(image, rig.views[0], a.image);
   other = a.size.reduced(other, rig.views[1], a.other);
   const ws::SynthesisedView synthesised = ws::synthesise_view(
@@ -66,6 +72,7 @@ void add_view_synthesis_command(CLI::App& app) {
                  "As it was given when the distances were matched: larger images are reduced to "
                  "this width and height at most, pixels");
   a->white_level.add_to(*command);
+  add_png_scale_of_input(*command, a->png_scale);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_synthesis(*a); });

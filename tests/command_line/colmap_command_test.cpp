@@ -240,7 +240,25 @@ TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
   EXPECT_TRUE(bytes_of("out/left.png/result.json") == left);
   EXPECT_GT(bytes_of("out/cloud.ply").size(), cloud.size());
   expect_error(reconstruct() + "--max-cost 0.3", "made with other settings: options/max_cost");
+  expect_error(reconstruct() + "--max-image-size 48", "made with other settings: max_image_size");
+  expect_error(reconstruct() + "--max-theta 50", "made with other settings: max_theta");
   ASSERT_EQ(run(reconstruct() + "--max-cost 0.3 --overwrite").exit_code, 0);
+}
+
+TEST_F(ReconstructCommand, LittleThatIsAcceptedGivesAHint) {
+  const std::string hint = "Little was accepted: check the poses";
+  const Outcome outcome = run(reconstruct() + "--max-cost 0.01 --min-views 1");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.output.find(hint), std::string::npos) << outcome.output;
+}
+
+TEST_F(ReconstructCommand, ResultsOfImagesThatAreGoneAreRemoved) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  replace_in_model("model/images.txt", "right/1.png", "right/2.png");
+  std::filesystem::rename(folder_ / "images/right/1.png", folder_ / "images/right/2.png");
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "out/right/2.png/result.json"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/right/1.png"));
 }
 
 TEST_F(ReconstructCommand, ImagesThatMovedAreMatchedAgain) {

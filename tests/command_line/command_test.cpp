@@ -8,6 +8,7 @@
 #include "data_folder.h"
 #include "replaced.h"
 #include "same_bits.h"
+#include "widestereo/calibration.h"
 
 namespace widestereo::test {
 namespace {
@@ -808,6 +809,10 @@ TEST_F(Command, CalibrationIsRefined) {
     return run("calibration check " + pair + "-c " + file(calibration)).output;
   };
   EXPECT_NE(verdict("refined.json").find("calibration: good\n"), std::string::npos);
+  ASSERT_EQ(run(refine + " -o " + file("limited.yaml") + " --max-theta 60").exit_code, 0);
+  const Rig limited = read_calibration(file("limited.yaml")).rig;
+  EXPECT_NEAR(limited.views[0].camera.max_theta, 97.5 * CV_PI / 180, 1e-9) << "as calibrated";
+  EXPECT_NEAR(limited.views[1].camera.max_theta, CV_PI, 1e-9) << "likewise";
   EXPECT_EQ(verdict("turned.yaml").find("calibration: good"), std::string::npos);
   // Turned by twelve degrees.
   folder_.write("far_off.yaml", replaced(bytes_of("calib.yaml"), rows,

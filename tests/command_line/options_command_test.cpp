@@ -242,6 +242,16 @@ TEST_F(EvaluateSets, AreFoundByTheirNames) {
                "has no depth0.tiff; give --truth");
 }
 
+TEST_F(EvaluateSets, OcclusionWithoutACamerasNumberIsOfThePair) {
+  std::string text = bytes_of("calib.yaml");
+  const std::string third = text.substr(text.find("cam1:"));
+  folder_.write("set/calib.yaml", text + "cam2:" + third.substr(5));
+  fs::copy_file(file("occlusion.png"), file("set/occ0.png"));
+  const std::string set = "--set " + file("set");
+  EXPECT_EQ(wrong_of(set).second, 0);
+  EXPECT_GT(wrong_of(set + " --source 2").second, 0.3) << "says nothing of camera 2";
+}
+
 TEST_F(EvaluateSets, FilesAreOfTheView) {
   cv::Mat truth(96, 96, CV_32FC1, cv::Scalar(2.0));
   truth.colRange(48, 96).setTo(0);  // nothing was hit

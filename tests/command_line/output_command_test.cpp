@@ -104,13 +104,64 @@ TEST_F(Output, DoesNotReplaceTheCalibrationThatIsRead) {
   fs::create_symlink("calib.yaml", folder_ / "link.yaml");
   const std::string images = file("left.png") + " " + file("right.png");
   for (const char* output : {"calib.yaml", "link.yaml"}) {
-    const std::string error = file(output) + " is the calibration that is read; choose another";
+    const std::string error = file(output) + " is among the files that are read; choose another";
     expect_error("calibration convert " + file("calib.yaml") + " " + file(output), error);
     expect_error(
         "calibration refine " + images + " -c " + file("calib.yaml") + " -o " + file(output),
         error);
   }
   EXPECT_EQ(bytes_of("calib.yaml"), before);
+}
+
+TEST_F(Output, PicturesDoNotReplaceWhatIsRead) {
+  cv::imwrite(file("distance.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2)));
+  const std::string calibration = " -c " + file("calib.yaml");
+  const auto expect_refused = [this](const std::string& arguments, const std::string& output) {
+    const std::string before = bytes_of(output);
+    expect_error(arguments + file(output), file(output) + " is among the files that are read;");
+    EXPECT_TRUE(bytes_of(output) == before);
+  };
+  expect_refused("view-synthesis " + file("distance.tiff") + " " + file("left.png") + " " +
+                     file("right.png") + calibration + " --picture ",
+                 "right.png");
+  for (const char* output : {"distance.tiff", "left.png"}) {
+    expect_refused("evaluate " + file("distance.tiff") + calibration + " --truth " +
+                       file("distance.tiff") + " --image " + file("left.png") + " --error-map ",
+                   output);
+  }
+}
+
+TEST_F(Output, DistancePngsOfAnyScaleAreRead) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,png --png-scale 500").exit_code,
+            0);
+  const auto median = [this](const std::string& distance) {
+    const Outcome outcome = run("evaluate " + file(distance) + " -c " + file("calib.yaml") +
+                                " --json --truth " + file("out/distance0.tiff"));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return nlohmann::json::parse(outcome.output)["regions"][0]["median_relative"].get<double>();
+  };
+  EXPECT_LT(median("out/distance0.png --png-scale 500"), 0.01);
+  EXPECT_NEAR(median("out/distance0.png"), 0.5, 0.01);
+  const std::string synthesis = "view-synthesis " + file("out/distance0.png") + " " +
+                                file("left.png") + " " + file("right.png") + " -c " +
+                                file("calib.yaml") + " --json";
+  EXPECT_NE(run(synthesis).output, run(synthesis + " --png-scale 500").output);
+}
+
+TEST_F(Output, FilesOfOthersAreNotReplaced) {
+  fs::create_directories(folder_ / "out");
+  for (const char* name : {"out/cloud0.ply", "out/reasons1.png", "out/result.json"}) {
+    folder_.write(name, "mine");
+    const Outcome outcome = run(depth_of("left.png", "right.png"));
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find("widestereo: " + file(name) +
+                                  " is there already and is not of an earlier run; move it"),
+              std::string::npos)
+        << outcome.output;
+    EXPECT_EQ(bytes_of(name), "mine");
+    fs::remove(folder_ / name);
+  }
+  EXPECT_TRUE(files_in("out").empty());
 }
 
 #ifndef __SANITIZE_ADDRESS__  // which needs more memory than this to begin with
@@ -238,7 +289,7 @@ TEST_F(Output, ARecordThatIsAFolderIsNone) {
   fs::create_directories(file("out/result.json"));
   const Outcome outcome = run(depth_of("left.png", "right.png"));
   EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_NE(outcome.output.find("widestereo: Cannot write " + file("out/result.json")),
+  EXPECT_NE(outcome.output.find("widestereo: " + file("out/result.json") + " is there already"),
             std::string::npos)
       << outcome.output;
 }
@@ -275,6 +326,8 @@ TEST_F(Output, OnlyFilesThatARecordOfOursNamesAreRemoved) {
   fs::create_directories(folder_ / "out");
   folder_.write("out/result.json", R"({"program": "other", "views": [{"files": {"a": "a.txt"}}]})");
   for (const char* name : {"out/a.txt", "out/distance7.png", "b.txt"}) folder_.write(name, "mine");
+  ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 1) << "a record of others";
+  fs::remove(folder_ / "out/result.json");
   ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 0);
   EXPECT_EQ(bytes_of("out/a.txt"), "mine");
   EXPECT_EQ(bytes_of("out/distance7.png"), "mine");

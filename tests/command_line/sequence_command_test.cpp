@@ -364,6 +364,46 @@ TEST_F(SequenceCommand, BlackFramesNeitherStartOthersNorHideSceneCuts) {
   EXPECT_EQ(starts("parts"), expected) << "resumed after the second one";
 }
 
+TEST_F(SequenceCommand, TheFirstFrameThatShowsAnythingTellsWhereTheLensEnds) {
+  std::string text = bytes_of("calib.yaml");
+  const std::string limit = "  max_theta_deg: 97.5\n";
+  folder_.write("calib.yaml", text.erase(text.find(limit), limit.size()));
+  for (int k = 0; k < 3; ++k) {
+    for (const char* camera : {"cam0", "cam1"}) {
+      const std::string path =
+          file(std::string("data/") + camera + "/00" + std::to_string(k) + ".png");
+      cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+      cv::Mat outside(image.size(), CV_8UC1, cv::Scalar(255));
+      cv::circle(outside, {48, 48}, 40, cv::Scalar(0), cv::FILLED);
+      image.setTo(0, outside);
+      if (k == 0) image.setTo(0);
+      cv::imwrite(path, image);
+    }
+  }
+  const Outcome outcome = run(sequence());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("cam0 is black from "), std::string::npos) << outcome.output;
+  const auto result = nlohmann::json::parse(bytes_of(folder_ / "out/001/result.json"));
+  EXPECT_LT(result["views"][0]["max_theta_degrees"], 120);
+}
+
+TEST_F(SequenceCommand, BlankCamerasAreNamed) {
+  for (int k = 0; k < 3; ++k) {
+    cv::imwrite(file("data/cam1/00" + std::to_string(k) + ".png"),
+                cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  }
+  EXPECT_NE(run(sequence() + "--count 1").output.find("The image of cam1 is blank but for noise"),
+            std::string::npos);
+}
+
+TEST_F(SequenceCommand, FramesThatAreGoneAreRemovedWithTheNextNewOne) {
+  ASSERT_EQ(run(sequence() + "--count 2").exit_code, 0);
+  for (const char* image : {"data/cam0/001.png", "data/cam1/001.png"}) fs::remove(folder_ / image);
+  ASSERT_EQ(run(sequence()).exit_code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "out/002/result.json"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/001"));
+}
+
 TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
   std::string poses = "# seconds, of the frames that are chosen\n";
   for (int camera = 0; camera < 2; ++camera) {
