@@ -248,8 +248,8 @@ TEST_F(Regression, IsTheSameInEveryUnitOfDistance) {
   measure([](int) { return wall; }, 0.1, 0.3);
   const Eigen::Vector3d in_metres = regressed(pixel, 18, 0.015, 4, REGRESS_NORMALS);
   ASSERT_NE(in_metres, Eigen::Vector3d::Zero());
-  cv::Vec4f& range = reinterpret_cast<cv::Vec4f&>(fixture_.schedule().parameters.range);
-  const cv::Vec4f range_in_metres = range;
+  auto& range = fixture_.schedule().parameters.range;
+  const auto range_in_metres = range;
   for (const float unit : {0x1p-26F, 0x1p26F}) {  // powers of two lose no bits
     measure([](int) { return wall; }, 0.1, 0.3);
     for (int i = 0; i < size * size; ++i) {
@@ -258,8 +258,10 @@ TEST_F(Regression, IsTheSameInEveryUnitOfDistance) {
       cv::Vec4f& check = fixture_.view(0).checks(i / size, i % size);
       check = cv::Vec4f(check[0], check[1] / unit, check[2] * unit, check[3]);
     }
-    range = cv::Vec4f(range_in_metres[0] / unit, range_in_metres[1] / unit,
-                      range_in_metres[2] * unit, range_in_metres[3] * unit);
+    range.x = range_in_metres.x / unit;
+    range.y = range_in_metres.y / unit;
+    range.z = range_in_metres.z * unit;
+    range.w = range_in_metres.w * unit;
     EXPECT_EQ(regressed(pixel, 18, 0.015, 4, REGRESS_NORMALS), unit * in_metres) << unit;
   }
 }
