@@ -141,7 +141,7 @@ struct Options {
                              ///< carry no information
   double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0..1
 
-  /// Left-right check: largest relative difference of distance, 0..1000.
+  /// Left-right check: largest relative difference of distance, 0..999.
   double consistency_relative = 0.02;
   double consistency_pixels = 1.0;  ///< left-right check: largest displacement, pixels, 0..999
   double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2

@@ -39,11 +39,10 @@ ViewCloud cloud_of(const View& view, const ViewMaps& maps) {
   const cv::Mat rays = ray_image(view.camera, view.mask);
   require_cloud_maps(maps.distance, rays, maps.normals, maps.image, maps.confidence,
                      " of " + view.name);
+  cv::Mat usable;
+  cv::extractChannel(rays, usable, 3);
   cv::Mat distance = maps.distance.clone();
-  for (int i = 0; i < static_cast<int>(distance.total()); ++i) {
-    const cv::Point pixel(i % distance.cols, i / distance.cols);
-    if (rays.at<cv::Vec4f>(pixel)[3] == 0) distance.at<float>(pixel) = 0;  // excluded
-  }
+  distance.setTo(0, usable == 0);
   cloud.points = make_point_cloud(distance, rays, maps.normals, maps.image, maps.confidence,
                                   view.world_from_camera);
   cloud.points.shrink_to_fit();
