@@ -54,12 +54,17 @@ std::vector<std::string> earlier_files(const fs::path& folder) {
   return files;
 }
 
+/// What a record names, and the record, which comes last.
+std::vector<std::string> all_files_of(const Json& record) {
+  std::vector<std::string> files = files_of(record);
+  files.emplace_back(result_record);
+  return files;
+}
+
 /// Throws Error where something that is no file of an earlier run has a name of the new ones.
 void require_no_other_files(const fs::path& folder, const Json& record) {
   const std::vector<std::string> earlier = earlier_files(folder);
-  std::vector<std::string> files = files_of(record);
-  files.emplace_back(result_record);
-  for (const std::string& file : files) {
+  for (const std::string& file : all_files_of(record)) {
     if (std::find(earlier.begin(), earlier.end(), file) != earlier.end()) continue;
     if (!fs::exists(fs::symlink_status(folder / file))) continue;
     throw ws::Error((folder / file).string() +
@@ -82,9 +87,7 @@ void remove_earlier_result(const fs::path& folder) {
 }
 
 void move_result(const fs::path& from, const fs::path& to, const Json& record) {
-  std::vector<std::string> files = files_of(record);
-  files.emplace_back(result_record);
-  for (const std::string& file : files) {
+  for (const std::string& file : all_files_of(record)) {
     std::error_code error;
     fs::rename(from / file, to / file, error);
     if (error) {
