@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <sstream>
 
+#include "text/formatted.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/rig.h"
@@ -17,9 +17,7 @@ namespace {
 void require(bool good, const std::string& name, const std::string& what, double value,
              const std::string& remedy) {
   if (good) return;
-  std::ostringstream text;
-  text << name << ": " << what << " is " << value << "; " << remedy << ".";
-  throw Error(text.str());
+  throw Error(name + ": " + what + " is " + formatted("%g", value) + "; " + remedy + ".");
 }
 
 void require_finite(const Camera& c, const std::string& name) {
