@@ -44,8 +44,9 @@ constexpr double interior_edge_clearance = 8;  ///< pixels
 /// Scores over one set of pixels. Shares lie in [0, 1]; a pixel without prediction counts as bad.
 /// Shares, means and medians over no pixel at all are NaN (null in JSON), but for completeness.
 struct RegionScores {
-  /// "all", "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg", and where there is an
-  /// image "textured" and "textured interior" (textured, and not at an edge of the true scene).
+  /// "all", where occlusion is known "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg",
+  /// and where there is an image "textured" and "textured interior" (textured, and not at an edge of
+  /// the true scene).
   std::string region;
   long pixels = 0;          ///< pixels scored
   double completeness = 0;  ///< share with a prediction, 0 of no pixel
@@ -70,7 +71,8 @@ struct RegionScores {
 /// `reference` against ground truth. Displacements are those of the predicted point's projection in
 /// view `source` from the true one's: a predicted point that does not project there counts as bad,
 /// a pixel whose true point lies outside the source image has none. `normals` (may be empty) as in
-/// GroundTruth. Field-angle bands and the textured regions are taken over the non-occluded pixels.
+/// GroundTruth. Field-angle bands and the textured regions are taken over the non-occluded pixels, all
+/// where occlusion is not known.
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source);

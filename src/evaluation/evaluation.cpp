@@ -8,6 +8,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <tuple>
 
 #include "evaluation/ground_truth.h"
 #include "geometry/angle.h"
@@ -295,13 +296,15 @@ std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& norma
       return s.non_occluded && s.theta >= from && s.theta < to;
     });
   };
-  std::vector<RegionScores> scores = {
-      score_where("all", [](const Sample&) { return true; }),
-      score_where("non-occluded", [](const Sample& s) { return s.non_occluded; }),
-      band("0-30 deg", 0, 30),
-      band("30-60 deg", 30, 60),
-      band("60-90 deg", 60, 90),
-      band(">90 deg", 90, 181)};
+  std::vector<RegionScores> scores = {score_where("all", [](const Sample&) { return true; })};
+  if (!truth.occlusion.empty()) {
+    scores.push_back(score_where("non-occluded", [](const Sample& s) { return s.non_occluded; }));
+  }
+  for (const auto& [name, from, to] :
+       {std::tuple("0-30 deg", 0, 30), std::tuple("30-60 deg", 30, 60),
+        std::tuple("60-90 deg", 60, 90), std::tuple(">90 deg", 90, 181)}) {
+    scores.push_back(band(name, from, to));
+  }
   if (!truth.image.empty()) {
     const cv::Mat rays = ray_image(reference.camera, {});
     const cv::Mat textured = textured_pixels(truth.image, inside_field_of_view(rays));
