@@ -119,6 +119,8 @@ void write_file(const fs::path& path, const std::function<void(std::ostream&)>& 
   if (temporary.error() != 0) throw cannot_write(path, temporary.error());
   write_checked(temporary.path(), only_existing, path, write);
   std::error_code error;
+  const fs::file_status before = fs::status(file, error);
+  if (fs::exists(before)) fs::permissions(temporary.path(), before.permissions(), error);
   temporary.rename_to(file, error);
   if (error) throw cannot_write(path, error.value());
 }

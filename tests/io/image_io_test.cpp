@@ -406,6 +406,23 @@ TEST(Writing, NoticesAFullDisk) {
   }
 }
 
+TEST(Writing, KeepsThePermissionsOfWhatItReplaces) {
+  const TemporaryFolder folder;
+  using std::filesystem::perms;
+  const auto mode = [&] { return std::filesystem::status(folder / "result.txt").permissions(); };
+  for (const perms before : {perms(0600), perms(0664)}) {
+    folder.write("result.txt", "old");
+    std::filesystem::permissions(folder / "result.txt", before);
+    write_text(folder / "result.txt", "new");
+    EXPECT_EQ(mode(), before);
+  }
+  std::filesystem::remove(folder / "result.txt");
+  const mode_t mask = umask(027);
+  write_text(folder / "result.txt", "first");
+  umask(mask);
+  EXPECT_EQ(mode(), perms(0640)) << "a new file has what the umask leaves";
+}
+
 TEST(Writing, FollowsSymbolicLinks) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "elsewhere");
