@@ -163,31 +163,35 @@ class Reconstruction {
  private:
   bool is_matched(std::size_t image) const { return matched_[image]; }
 
-  /// The views that are matched with each other in a group, and their images.
-  Json views_of(const Images& group) const {
+  /// What each group has of its own: the views that are matched with each other, their images, and
+  /// the range of distances.
+  Json inputs_of(std::size_t group) const {
     Json views = Json::array();
-    for (const std::size_t image : group) {
+    for (const std::size_t image : groups_[group]) {
       views.push_back(to_json(images_.views[image]));
       views.back()["file"] = file_record(images_.files[image]);
     }
-    return views;
+    const ws::Options& options = options_[group];
+    return {{"group", views}, {"range", {options.min_distance, options.max_distance}}};
   }
 
-  /// Results of an earlier run that came of the same images, cameras, poses and masks.
+  /// Results of an earlier run that came of the same images, cameras, poses, masks and ranges.
   void keep_results() {
     matched_.resize(images_.views.size());
     std::map<std::string, std::pair<std::size_t, Json>> wanted;
-    for (const Images& group : groups_) {
-      const Json views = views_of(group);
-      for (const std::size_t image : group) {
-        wanted.emplace(images_.views[image].name, std::pair{image, views});
+    for (std::size_t i = 0; i < groups_.size(); ++i) {
+      const Json inputs = inputs_of(i);
+      for (const std::size_t image : groups_[i]) {
+        wanted.emplace(images_.views[image].name, std::pair{image, inputs});
       }
     }
     Json kept = Json::array();
     for (const Json& result : folders_.results()) {
       const auto image = wanted.find(result["name"].get<std::string>());
-      if (image == wanted.end() || result.value("group", Json()) != image->second.second) continue;
-      if (!folders_.is_there(result)) continue;
+      if (image == wanted.end()) continue;
+      Json of_inputs = result;
+      of_inputs.update(image->second.second);
+      if (of_inputs != result || !folders_.is_there(result)) continue;
       kept.push_back(result);
       matched_[image->second.first] = true;
     }
@@ -213,7 +217,7 @@ class Reconstruction {
     require_no_validation_messages(device_);
     report_views_without_overlap(rig, run.result);
     for (std::size_t i = 0; i < group.size(); ++i) {
-      if (!is_matched(group[i])) write(group, i, pixels[i], run);
+      if (!is_matched(group[i])) write(number, i, pixels[i], run);
     }
     if (arguments_.as_json || bar.visible()) return;
     std::printf("group %zu of %zu: %s and %zu more, %.2f s\n", number + 1, count,
@@ -222,20 +226,22 @@ class Reconstruction {
     std::fflush(stdout);
   }
 
-  void write(const Images& group, std::size_t index, const cv::Mat& pixels,
+  /// The result of one image of a group.
+  void write(std::size_t number, std::size_t index, const cv::Mat& pixels,
              const MatchingRun& group_run) {
+    const Images& group = groups_[number];
     const std::size_t image = group[index];
     const ws::Rig rig{.views = {images_.views[image]}};
     const std::vector<cv::Mat> images = {pixels};
     MatchingRun run = group_run;
     run.result.views = {group_run.result.views[index]};
     const ws::ViewResult& result = run.result.views.front();
-    const Json record = {
+    Json record = {
         {"name", images_.views[image].name},
         {"group_milliseconds", run.result.milliseconds},
         {"accepted", accepted_share(result)},
-        {"mean_cost", ws::consistency_scores(result.differences, result.cost).mean_cost},
-        {"group", views_of(group)}};
+        {"mean_cost", ws::consistency_scores(result.differences, result.cost).mean_cost}};
+    record.update(inputs_of(number));
     folders_.add(images_.views[image].name, [&](const fs::path& folder) {
       FolderContents contents{
           .rig = rig, .images = images, .run = run, .in_metres = images_.in_metres};

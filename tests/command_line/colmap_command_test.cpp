@@ -270,6 +270,15 @@ TEST_F(ReconstructCommand, ImagesThatMovedAreMatchedAgain) {
   EXPECT_EQ(record()["images"].size(), 2U);
 }
 
+TEST_F(ReconstructCommand, PointsThatMovedAreMatchedAgainInTheirRange) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  replace_in_model("model/points3D.txt", "0 0 4", "0 0 5");
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  EXPECT_NEAR(record_of("out/left.png")["options"]["max_distance"], 1.25 * std::hypot(5, 0.1),
+              1e-9);
+  EXPECT_EQ(record()["images"].size(), 2U);
+}
+
 TEST_F(ReconstructCommand, ReplacedImagesAreMatchedAgain) {
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   const std::string before = bytes_of("out/left.png/distance0.tiff");
