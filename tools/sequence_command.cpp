@@ -76,17 +76,22 @@ std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame, const WhiteLeve
   return images;
 }
 
+struct LoadedFrame {
+  const ws::SequenceFrame& frame;
+  std::vector<cv::Mat> images;
+};
+
 /// The first frame without a blank image, as cameras that are just starting give; else the first.
-const ws::SequenceFrame& first_with_content(const std::vector<ws::SequenceFrame>& frames,
-                                            const WhiteLevel& white_level) {
+LoadedFrame first_with_content(const std::vector<ws::SequenceFrame>& frames,
+                               const WhiteLevel& white_level) {
   for (const ws::SequenceFrame& frame : frames) {
-    const std::vector<cv::Mat> images = read_images(frame, white_level);
-    if (std::none_of(images.begin(), images.end(),
+    LoadedFrame loaded{frame, read_images(frame, white_level)};
+    if (std::none_of(loaded.images.begin(), loaded.images.end(),
                      [](const cv::Mat& image) { return is_blank(image, cv::Mat()); })) {
-      return frame;
+      return loaded;
     }
   }
-  return frames.front();
+  return {frames.front(), read_images(frames.front(), white_level)};
 }
 
 /// A frame's images as they are matched; throws Error unless they have the calibrated sizes.
@@ -112,8 +117,7 @@ Selection select_frames(const SequenceArguments& a) {
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
-  const ws::SequenceFrame& start = first_with_content(selection.frames, a.white_level);
-  const std::vector<cv::Mat> images = read_images(start, a.white_level);
+  const auto& [start, images] = first_with_content(selection.frames, a.white_level);
   selection.calibrated = a.rig.rig_for_images(cameras.size(), images.front().size());
   selection.rig = selection.calibrated;
   for (ws::View& view : selection.rig.views) view = a.size.reduced(view);
