@@ -155,7 +155,7 @@ void require_listed(const Images& images) {
   for (const auto& [time, path] : images.of_frames) {
     if (type_of(path) != fs::file_type::not_found) continue;
     throw Error("The frame " + time + " has no image " + path.string() +
-                ", which data.csv lists; add it, or leave such frames out (--skip-incomplete).");
+                ", which data.csv lists; add it, or skip incomplete frames.");
   }
 }
 
@@ -190,7 +190,7 @@ fs::path camera_folder(const fs::path& folder, int camera) {
   }
   throw Error("There is no folder " + (folder / name).string() +
               "; a data set has images in cam0, cam1, ... or in mav0/cam0/data, mav0/cam1/data, "
-              "..., else name the folders of its cameras (--folders).");
+              "..., else name the folders of its cameras.");
 }
 
 /// Frames are told apart by name, which is also that of a folder.
@@ -241,7 +241,7 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool ski
         throw Error("The frame " + key + " has no image in " + images[i].folder.string() + " (" +
                     std::to_string(images[i].of_frames.size()) + " of " +
                     std::to_string(counts.size()) +
-                    " frames have one); add it, or leave such frames out (--skip-incomplete).");
+                    " frames have one); add it, or skip incomplete frames.");
       }
     }
     if (frame.images.size() != images.size()) continue;

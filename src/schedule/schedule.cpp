@@ -180,9 +180,8 @@ class Builder {
     throw Error("The rig has " + std::to_string(images) + " views, but " + std::to_string(levels_) +
                 " pyramid level(s) allow " + std::to_string(most) + "; match fewer images" +
                 (images <= MAX_IMAGES
-                     ? ", or choose --levels " +
-                           std::to_string(MAX_VIEWS / static_cast<int>(images)) +
-                           " with as many --level-iterations and --level-regressions."
+                     ? ", or choose " + std::to_string(MAX_VIEWS / static_cast<int>(images)) +
+                           " level(s) with as many level iterations and level regressions."
                      : "."));
   }
 

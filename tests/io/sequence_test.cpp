@@ -107,7 +107,7 @@ TEST_F(Sequences, FoldersOfCamerasMayHaveAnyNames) {
                 read_sequence({folder_ / "left/images", folder_ / "up"});
               }),
               HasSubstr("up"));
-  EXPECT_THAT(error(), HasSubstr("--folders"));
+  EXPECT_THAT(error(), HasSubstr("name the folders"));
   EXPECT_THAT(error({}), HasSubstr("at least one"));
 }
 
