@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The shared kernel source that needs no back end, compiled for the host: vectors, cameras (in single
-// and double precision) and the parameter blocks.
+// The shared kernel source that needs no back end, compiled for the host: vectors, cameras (in
+// single and double precision) and the parameter blocks.
 #pragma once
 
 #include "portable.h"
