@@ -67,7 +67,7 @@ struct KernelTime {
   std::string kernel;
   int dispatches = 0;
   double milliseconds = 0;  ///< device time, summed; 0 where kernels are not timed
-  KernelWork work = {};     ///< likewise
+  KernelWork work = {};     ///< summed
 };
 
 struct StereoResult {
@@ -80,14 +80,16 @@ struct StereoResult {
   Filter filter = Filter::exact;  ///< that was used: Options::filter where the device has it
 };
 
-/// `distance` with rejected pixels (reasons != 0) that were not filled set to 0.
+/// `distance` with rejected pixels (reasons != 0) that were not filled set to 0. Throws Error where
+/// the two maps are not there or do not fit.
 cv::Mat accepted_distance(const ViewResult& view);
 
 /// How a frame of a sequence starts from the frame before it.
 struct WarmStart {
   /// How points moved in the rig's frame (that of View::world_from_camera, metres) since then:
   /// X now = T X previous, so for poses P of the rig in the world: P(now)^-1 P(previous). Left out
-  /// where unknown: the planes then start where they were.
+  /// where unknown: the planes then start where they were. A rotation and a translation, or
+  /// matching throws Error.
   std::optional<Eigen::Isometry3d> now_from_previous = std::nullopt;
   /// ViewResult::hypotheses of the previous frame, one for each view; empty: those of this
   /// matcher's last match, which are still on the device.
@@ -97,8 +99,8 @@ struct WarmStart {
 };
 
 /// Matches images of one rig; made once, used for many frames of the same sizes.
-/// Not thread-safe; matchers are independent of each other, also those of one device in different
-/// threads, and must not outlive their device.
+/// Not thread-safe, nor to be called from its own Progress; matchers are independent of each other,
+/// also those of one device in different threads, and must not outlive their device.
 class Matcher {
  public:
   /// Called between submissions with the share done in [0, 1]. What it throws ends the match.

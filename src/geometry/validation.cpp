@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "geometry/angle.h"
 #include "text/formatted.h"
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -30,19 +31,19 @@ void require_finite(const Camera& c, const std::string& name) {
   check("max_theta", c.max_theta);
 }
 
-void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
-  if (pose.matrix().allFinite() && is_rotation(pose.linear())) return;
-  throw Error(name +
-              ": the pose is not a rigid motion; its rotation must be orthonormal with "
-              "determinant +1 and all entries finite.");
-}
-
 }  // namespace
 
 bool is_rotation(const Eigen::Matrix3d& matrix) {
   constexpr double rounding = 3.1e-4;  // 2 * 3 * 0.5e-4, and what is of second order
   return (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).norm() <= rounding &&
          matrix.determinant() > 0;
+}
+
+void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
+  if (pose.matrix().allFinite() && is_rotation(pose.linear())) return;
+  throw Error(name +
+              ": the pose is not a rigid motion; its rotation must be orthonormal with "
+              "determinant +1 and all entries finite.");
 }
 
 void validate(const Camera& c, const std::string& name) {
@@ -55,8 +56,8 @@ void validate(const Camera& c, const std::string& name) {
   require_finite(c, name);
   require(c.fx > 0, name, "fx", c.fx, "it must be positive");
   require(c.fy > 0, name, "fy", c.fy, "it must be positive");
-  require(c.max_theta > 0 && c.max_theta <= std::numbers::pi + 1e-12, name, "max_theta (radians)",
-          c.max_theta, "it must lie in (0, pi]");
+  require(c.max_theta > 0 && c.max_theta <= std::numbers::pi + 1e-12, name, "max_theta (degrees)",
+          c.max_theta * degrees_per_radian, "it must be more than 0 and at most 180");
   require(c.shear == 0 || c.model == CameraModel::polynomial_fisheye, name, "shear", c.shear,
           "only polynomial_fisheye has one");
   switch (c.model) {
@@ -158,14 +159,16 @@ void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::
               "; use an 8-bit grey mask of that size.");
 }
 
+void require_valid(const View& view, const std::string& name) {
+  const std::string of_view = name + ": " + view.name;
+  validate(view.camera, of_view);
+  require_rigid(view.world_from_camera, of_view);
+  require_fitting_mask(view.mask, view.camera, of_view);
+}
+
 void validate(const Rig& rig, const std::string& name) {
   require_cameras(rig, name);
-  for (const View& view : rig.views) {
-    const std::string of_view = name + ": " + view.name;
-    validate(view.camera, of_view);
-    require_rigid(view.world_from_camera, of_view);
-    require_fitting_mask(view.mask, view.camera, of_view);
-  }
+  for (const View& view : rig.views) require_valid(view, name);
   if (rig.world_from_imu) require_rigid(*rig.world_from_imu, name + ": IMU");
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     for (std::size_t j = i + 1; j < rig.views.size(); ++j) {

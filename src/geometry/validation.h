@@ -21,6 +21,13 @@ bool is_rotation(const Eigen::Matrix3d& matrix);
 Eigen::Quaterniond require_unit(const Eigen::Quaterniond& quaternion, const std::string& name,
                                 const std::string& remedy);
 
+/// Throws Error unless a pose is a rigid motion. `name` begins the message.
+void require_rigid(const Eigen::Isometry3d& pose, const std::string& name);
+
+/// Throws Error unless camera, pose and mask of a view are as they must be. `name` begins the
+/// message.
+void require_valid(const View& view, const std::string& name);
+
 /// Throws Error unless `number` is that of one of `count` things called `name` ("view"), numbered
 /// from 0. `of`, what has them, begins the message.
 void require_number(std::size_t number, std::size_t count, const std::string& name,

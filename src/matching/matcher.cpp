@@ -194,6 +194,8 @@ class Matcher::Implementation {
 };
 
 cv::Mat accepted_distance(const ViewResult& view) {
+  require_type(view.distance, CV_32FC1, "The distance map");
+  require_map(view.reasons, view.distance.size(), CV_16UC1, "The map of reasons");
   cv::Mat distance = view.distance.clone();
   const cv::Mat filled = (view.reasons & reason_filled) != 0;
   distance.setTo(0, (view.reasons != 0) & ~filled);

@@ -306,6 +306,7 @@ void require_sizes(const Rig& rig, const std::vector<cv::Mat>& previous_images,
   }
   for (std::size_t i = 0; i < count; ++i) {
     const View& view = rig.views[i];
+    require_valid(view, "The rig");
     const cv::Size size(view.camera.width, view.camera.height);
     require_size(previous_images[i], size, "The previous image of " + view.name);
     require_size(images[i], size, "The image of " + view.name);

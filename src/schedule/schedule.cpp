@@ -9,6 +9,7 @@
 
 #include "geometry/angle.h"
 #include "geometry/camera_parameters.h"
+#include "geometry/validation.h"
 #include "kernel/enumerations.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -568,6 +569,7 @@ Schedule make_warm_schedule(const Rig& rig, const Options& options) {
 
 void set_motion(Schedule& schedule, const Rig& rig, const Eigen::Isometry3d& now_from_previous,
                 int frame) {
+  require_rigid(now_from_previous, "The motion from the previous frame");
   schedule.parameters.frame.x = frame;
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     const Eigen::Isometry3d& rig_from_camera = rig.views[i].world_from_camera;

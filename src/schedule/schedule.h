@@ -72,6 +72,7 @@ Schedule make_warm_schedule(const Rig& rig, const Options& options);
 
 /// Sets how the rig moved since the previous frame, and which frame of its sequence this is; the
 /// dispatches stay the same. `now_from_previous`: X now = T X then, in the rig's frame (metres).
+/// Throws Error, and changes nothing, where that is no rigid motion.
 void set_motion(Schedule& schedule, const Rig& rig, const Eigen::Isometry3d& now_from_previous,
                 int frame);
 

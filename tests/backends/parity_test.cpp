@@ -741,6 +741,9 @@ TEST(AcceptedDistance, IsThatOfPixelsThatAreNotRejectedOrFilledAllTheSame) {
   view.reasons = (cv::Mat_<std::uint16_t>(1, 3) << 0, reason_tilt, reason_tilt | reason_filled);
   const cv::Mat expected = (cv::Mat_<float>(1, 3) << 1, 0, 3);
   EXPECT_TRUE(same_bits(accepted_distance(view), expected));
+  view.reasons = view.reasons.colRange(0, 2);
+  EXPECT_THROW(accepted_distance(view), Error);
+  EXPECT_THROW(accepted_distance({}), Error);
 }
 
 TEST(DeviceChoice, IsByNameOrByRequest) {

@@ -152,6 +152,15 @@ TEST_P(WarmStarts, ARefusedFrameChangesNothing) {
   EXPECT_THAT(refused(images), HasSubstr("cam1"));
   bad.hypotheses[1] = cv::Mat::zeros(3, 4, CV_32FC4);
   EXPECT_THAT(refused(images_of(frame(1))), HasSubstr("cam1 from is 4x3"));
+  bad.hypotheses.clear();
+  Eigen::Matrix4d no_motion = Eigen::Matrix4d::Identity();
+  no_motion(0, 3) = std::numeric_limits<double>::quiet_NaN();
+  const Eigen::Matrix4d mirror = Eigen::Vector4d(-1, 1, 1, 1).asDiagonal();
+  const Eigen::Matrix4d larger = Eigen::Vector4d(2, 2, 2, 1).asDiagonal();
+  for (const Eigen::Matrix4d& wrong : {no_motion, mirror, larger}) {
+    bad.now_from_previous->matrix() = wrong;
+    EXPECT_THAT(refused(images_of(frame(1))), HasSubstr("is not a rigid motion")) << wrong;
+  }
 
   const WarmStart start{.now_from_previous = motion_to(1)};
   const StereoResult expected = untroubled.match_next(images_of(frame(1)), start);
@@ -236,6 +245,16 @@ TEST(Motion, IsFoundToAFractionOfAPixel) {
       EXPECT_LT(error.translation().norm(), metres);
     }
   }
+}
+
+TEST(Motion, NeedsARigThatIsValid) {
+  Rig rig = frame(0).rig;
+  rig.views[1].camera.fx = -1;
+  EXPECT_THAT(error_of([&] {
+                estimate_motion(rig, images_of(frame(0)), true_planes(frame(0)),
+                                images_of(frame(1)));
+              }),
+              HasSubstr("The rig: cam1: fx is -1"));
 }
 
 TEST(Motion, IsNotInventedWhereNothingShowsIt) {
