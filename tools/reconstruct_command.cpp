@@ -196,6 +196,9 @@ class Reconstruction {
       matched_[image->second.first] = true;
     }
     folders_.keep(kept);
+    if (kept.empty()) return;
+    say(std::to_string(kept.size()) + " of " + std::to_string(wanted.size() - alone_in(groups_)) +
+        " images are kept as an earlier run matched them.");
   }
 
   void match(std::size_t number, ProgressBar& bar) {

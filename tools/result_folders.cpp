@@ -65,6 +65,7 @@ ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, b
   read(settings, overwrite);
   std::error_code ignored;
   for (const char* left : {unfinished_result, removed}) fs::remove_all(folder_ / left, ignored);
+  ws::remove_unfinished_files(folder_);
 }
 
 bool ResultFolders::is_record_of_result(const Json& record) const {
@@ -145,6 +146,9 @@ void ResultFolders::remove(const std::string& name) const {
   fs::rename(path, folder_ / removed, error);
   if (!error) fs::remove_all(folder_ / removed, error);
   if (error) throw ws::Error("Cannot remove " + path.string() + ": " + error.message() + ".");
+  for (fs::path parent = path.parent_path(); parent != folder_; parent = parent.parent_path()) {
+    if (!fs::remove(parent, error)) break;  // there is something else in it
+  }
 }
 
 void ResultFolders::add(const std::string& name,
@@ -155,7 +159,6 @@ void ResultFolders::add(const std::string& name,
   }
   const TemporaryFolder temporary(folder_ / unfinished_result);
   Json result = write(temporary.path());
-  for (const std::string& old : std::exchange(obsolete_, {})) remove(old);
   remove(name);
   // First, so that what has the name is known to be a result, whenever the run ends.
   record_[kind_.results].push_back(std::move(result));
@@ -172,6 +175,7 @@ void ResultFolders::note(const std::string& key, Json value) {
   write_record();
 }
 
-void ResultFolders::write_record() const {
+void ResultFolders::write_record() {
+  for (const std::string& old : std::exchange(obsolete_, {})) remove(old);
   ws::write_text(record_path(kind_.name), ws::to_text(record_) + "\n");
 }

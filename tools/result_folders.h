@@ -32,16 +32,16 @@ class ResultFolders {
 
   /// Takes up the folder where an earlier run left it; throws Error where that was of another kind.
   /// `settings`: all that decides the results; throws Error naming the first difference to those of
-  /// an earlier run. With `overwrite` its results are removed instead, as soon as there is a new
-  /// one.
+  /// an earlier run. With `overwrite` its results are removed instead, as soon as there is
+  /// something new to record.
   ResultFolders(std::filesystem::path folder, Kind kind, const Json& settings, bool overwrite);
 
   const std::filesystem::path& folder() const { return folder_; }
   const Json& record() const { return record_; }
   /// Records of the finished results, in the order in which they were added.
   const Json& results() const { return record_[kind_.results]; }
-  /// Forgets those results that are not among `kept`: they are removed as soon as there is a new
-  /// one.
+  /// Forgets those results that are not among `kept`: they are removed as soon as there is
+  /// something new to record.
   void keep(const Json& kept);
   /// Whether all files of the result that a record is about are still there.
   bool is_there(const Json& result) const;
@@ -65,9 +65,10 @@ class ResultFolders {
   }
   void read(const Json& settings, bool overwrite);
   bool is_record_of_result(const Json& record) const;
-  /// Removes a result, of this run or of an earlier one.
+  /// Removes a result, of this run or of an earlier one, and folders that it leaves empty.
   void remove(const std::string& name) const;
-  void write_record() const;
+  /// What is obsolete goes first, for nothing would know of it afterwards.
+  void write_record();
 
   std::filesystem::path folder_;
   std::optional<FolderLock> lock_;

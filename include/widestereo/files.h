@@ -22,6 +22,10 @@ void write_text(const std::filesystem::path& path, const std::string& text);
 /// naming the folder where either fails.
 void prepare_output_folder(const std::filesystem::path& folder);
 
+/// Removes from a folder, in which no other process may be writing, what write_file() leaves there
+/// where its process is killed.
+void remove_unfinished_files(const std::filesystem::path& folder);
+
 /// Throws Error where a file cannot be written, for those that are written after long work.
 void require_writable(const std::filesystem::path& file);
 

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <fstream>
 #include <system_error>
+#include <vector>
 
 #include "widestereo/error.h"
 
@@ -20,6 +21,9 @@ fs::path folder_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
 
+/// What names of files that are not finished begin with.
+constexpr const char* unfinished = ".writing-";
+
 /// A new file, empty, that is removed when leaving scope unless it was renamed.
 class TemporaryFile {
  public:
@@ -29,7 +33,7 @@ class TemporaryFile {
     static std::atomic<unsigned> counter{0};
     constexpr mode_t all_may_write = 0666;  // less the umask, as a stream makes files
     do {
-      path_ = folder / (".writing-" + std::to_string(getpid()) + "-" + std::to_string(counter++));
+      path_ = folder / (unfinished + std::to_string(getpid()) + "-" + std::to_string(counter++));
       const int file = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, all_may_write);
       error_ = file < 0 ? errno : 0;
       if (file >= 0) close(file);
@@ -73,6 +77,7 @@ Error cannot_write(const fs::path& path, int error) {
 /// The file to replace when `path` is written: where its symbolic links lead, even to nothing yet.
 /// Empty for what is no file of a folder: devices, FIFOs and, by links of /proc, open files.
 fs::path file_to_replace(const fs::path& path) {
+  if (path.empty()) throw Error("Cannot write a file without a name; give one.");
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (status.type() == fs::file_type::none) throw cannot_write(path, error.value());
@@ -137,6 +142,15 @@ void prepare_output_folder(const fs::path& folder) {
     throw Error("Cannot write into the output folder " + folder.string() +
                 "; check its permissions and free space, or choose another one.");
   }
+}
+
+void remove_unfinished_files(const fs::path& folder) {
+  std::error_code ignored;
+  std::vector<fs::path> left;
+  for (fs::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored)) {
+    if (entry->path().filename().string().starts_with(unfinished)) left.push_back(entry->path());
+  }
+  for (const fs::path& file : left) fs::remove(file, ignored);
 }
 
 void require_writable(const fs::path& path) {

@@ -261,6 +261,23 @@ TEST_F(ReconstructCommand, ResultsOfImagesThatAreGoneAreRemoved) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/right/1.png"));
 }
 
+TEST_F(ReconstructCommand, WhatIsGoneIsRemovedAlsoWhereNothingIsMatched) {
+  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  auto more = nlohmann::ordered_json::parse(bytes_of("out/reconstruction.json"));
+  more["images"].push_back(more["images"][0]);
+  more["images"].back()["name"] = "gone/1.png";
+  folder_.write("out/reconstruction.json", more.dump());
+  std::filesystem::create_directories(folder_ / "out/gone");
+  std::filesystem::copy(folder_ / "out/left.png", folder_ / "out/gone/1.png");
+  folder_.write("out/.writing-1-0", "a killed run's");
+  const Outcome outcome = run(reconstruct());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("2 of 2 images are kept"), std::string::npos) << outcome.output;
+  EXPECT_EQ(record()["images"].size(), 2U);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/gone"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/.writing-1-0"));
+}
+
 TEST_F(ReconstructCommand, ImagesThatMovedAreMatchedAgain) {
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   const std::string before = bytes_of("out/left.png/distance0.tiff");

@@ -103,6 +103,18 @@ TEST(Maps, PngRoundsAndMarksWhatItCannotHold) {
   EXPECT_FLOAT_EQ(read_map(folder / "d.png", 500).at<float>(0, 0), 2.47f);
 }
 
+TEST(Maps, ScalesOfPngAreAboveZero) {
+  const TemporaryFolder folder;
+  const cv::Mat map = cv::Mat::ones(3, 3, CV_32FC1);
+  for (const double scale : {0.0, -1000.0, static_cast<double>(NAN)}) {
+    EXPECT_NE(error_of([&] { write_map(folder / "m.png", map, scale); }).find("scale of PNG"),
+              std::string::npos);
+    EXPECT_NE(error_of([&] { read_map(folder / "m.png", scale); }).find("scale of PNG"),
+              std::string::npos);
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
 TEST(Maps, UnsupportedOnesAreRefused) {
   const TemporaryFolder folder;
   EXPECT_THROW(write_map(folder / "a.jpg", random_map(CV_32FC1)), Error);
@@ -416,11 +428,6 @@ TEST(Writing, KeepsThePermissionsOfWhatItReplaces) {
     write_text(folder / "result.txt", "new");
     EXPECT_EQ(mode(), before);
   }
-  std::filesystem::remove(folder / "result.txt");
-  const mode_t mask = umask(027);
-  write_text(folder / "result.txt", "first");
-  umask(mask);
-  EXPECT_EQ(mode(), perms(0640)) << "a new file has what the umask leaves";
 }
 
 TEST(Writing, FollowsSymbolicLinks) {
@@ -472,6 +479,27 @@ TEST(Writing, LeavesDevicesAndFifosWhatTheyAre) {
   EXPECT_TRUE(std::filesystem::is_character_file(folder / "full"));
   EXPECT_NE(error_of([&] { write_text(folder.path(), "x"); }).find("is a folder"),
             std::string::npos);
+}
+
+TEST(Writing, WhatAKilledProcessLeavesIsRemovedOnDemand) {
+  const TemporaryFolder folder;
+  folder.write("kept.txt", "");
+  std::filesystem::path unfinished;
+  write_file(folder / "a.txt", [&](std::ostream&) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+      if (entry.path().filename() != "kept.txt") unfinished = entry.path();
+    }
+  });
+  folder.write(unfinished.filename(), "");
+  remove_unfinished_files(folder.path());
+  EXPECT_FALSE(std::filesystem::exists(unfinished));
+  EXPECT_TRUE(std::filesystem::exists(folder / "kept.txt"));
+  EXPECT_NO_THROW(remove_unfinished_files(folder / "none"));
+}
+
+TEST(Writing, NeedsAName) {
+  EXPECT_NE(error_of([] { write_text("", "x"); }).find("without a name"), std::string::npos);
+  EXPECT_NE(error_of([] { require_writable(""); }).find("without a name"), std::string::npos);
 }
 
 TEST(Writing, TakesTheLongestNames) {
