@@ -1,11 +1,25 @@
 // SPDX-License-Identifier: MIT
 #include "frame_settings.h"
 
+#include <algorithm>
+
 #include "option_checks.h"
+#include "say.h"
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
 namespace fs = std::filesystem;
+
+namespace {
+
+void report_incomplete(const std::vector<ws::SequenceFrame>& all, std::size_t complete) {
+  if (complete == all.size()) return;
+  const auto first = std::find_if_not(all.begin(), all.end(), ws::is_complete);
+  say(std::to_string(all.size() - complete) + " of " + std::to_string(all.size()) +
+      " frames are left out, as a camera lacks them; the first is " + first->name + ".");
+}
+
+}  // namespace
 
 void FrameSettings::add_to(CLI::App& command) {
   const std::string group = "Frames";
@@ -49,15 +63,20 @@ ChosenFrames FrameSettings::choose(const std::string& dataset,
   ChosenFrames frames{.all = folders.empty() ? ws::read_sequence(dataset, cameras, skip_incomplete)
                                              : ws::read_sequence(of_cameras, skip_incomplete),
                       .chosen = {}};
-  if (first >= static_cast<int>(frames.all.size())) {
-    throw ws::Error(dataset + " has " + std::to_string(frames.all.size()) +
+  std::vector<std::size_t> complete;
+  for (std::size_t i = 0; i < frames.all.size(); ++i) {
+    if (ws::is_complete(frames.all[i])) complete.push_back(i);
+  }
+  report_incomplete(frames.all, complete.size());
+  if (first >= static_cast<int>(complete.size())) {
+    throw ws::Error(dataset + " has " + std::to_string(complete.size()) +
                     " frames; there is no frame " + std::to_string(first) +
                     " to start from (--first counts from 0).");
   }
-  for (std::size_t i = static_cast<std::size_t>(first); i < frames.all.size();
+  for (std::size_t i = static_cast<std::size_t>(first); i < complete.size();
        i += static_cast<std::size_t>(step)) {
     if (count > 0 && frames.chosen.size() == static_cast<std::size_t>(count)) break;
-    frames.chosen.push_back(i);
+    frames.chosen.push_back(complete[i]);
   }
   return frames;
 }

@@ -11,7 +11,7 @@
 
 struct ChosenFrames {
   std::vector<widestereo::SequenceFrame> all;
-  std::vector<std::size_t> chosen;  ///< of these, at least one
+  std::vector<std::size_t> chosen;  ///< of these, at least one, each with an image of every camera
 };
 
 struct FrameSettings {
@@ -33,6 +33,6 @@ struct FrameSettings {
   }
   /// An image of the first of some cameras.
   std::filesystem::path example(const std::string& dataset, int first_camera) const;
-  /// Of all frames of these cameras.
+  /// Of all frames of these cameras, those that all of them have; says where others are left out.
   ChosenFrames choose(const std::string& dataset, const std::vector<int>& cameras) const;
 };

@@ -12,9 +12,10 @@ namespace widestereo {
 
 /// The images that a rig took at one time.
 struct SequenceFrame {
-  std::string name;                           ///< the files' name without extension
-  std::vector<std::filesystem::path> images;  ///< one for each camera asked for
-  std::optional<std::int64_t> nanoseconds;    ///< time stamp, where the data set has them
+  std::string name;  ///< the files' name without extension
+  std::vector<std::filesystem::path>
+      images;                               ///< one for each camera asked for, empty if it has none
+  std::optional<std::int64_t> nanoseconds;  ///< time stamp, where the data set has them
 };
 
 /// Nanoseconds since 1970 that the number at the end of a file's name without extension stands for,
@@ -28,16 +29,19 @@ std::optional<std::int64_t> time_in_name(const std::string& name);
 /// count as numbers; or EuRoC and TUM VI: FOLDER[/mav0]/camN/data/ with camN/data.csv (`#timestamp
 /// [ns],filename`), frames being those of equal times. Without that list frames have the time in
 /// their names. Throws Error for missing folders, two cameras with one folder, no images, or a
-/// frame that some camera lacks unless those are to be skipped, with those of which a listed file
-/// is missing.
+/// frame that some camera lacks, also a file that is listed, unless there may be such frames; all
+/// of them may not.
 std::vector<SequenceFrame> read_sequence(const std::filesystem::path& folder,
                                          const std::vector<int>& cameras,
-                                         bool skip_incomplete = false);
+                                         bool allow_incomplete = false);
 
 /// The same of cameras whose images are in these folders, at least one: each holds images, or data/
 /// with images and perhaps data.csv.
 std::vector<SequenceFrame> read_sequence(const std::vector<std::filesystem::path>& camera_folders,
-                                         bool skip_incomplete = false);
+                                         bool allow_incomplete = false);
+
+/// Whether all cameras have an image of the frame.
+bool is_complete(const SequenceFrame& frame);
 
 /// What poses are of: camera 0 of the calibration, whose frame is the rig's, or the IMU (the body).
 enum class Body { camera, imu };

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <fstream>
+#include <functional>
 #include <map>
 
 #include "io/frame_times.h"
@@ -193,10 +194,16 @@ fs::path camera_folder(const fs::path& folder, int camera) {
               "..., else name the folders of its cameras.");
 }
 
+const fs::path& first_image(const SequenceFrame& frame) {
+  return *std::find_if(frame.images.begin(), frame.images.end(),
+                       [](const fs::path& image) { return !image.empty(); });
+}
+
 /// Frames are told apart by name, which is also that of a folder.
 void require_usable_names(const std::vector<SequenceFrame>& frames) {
   std::map<std::string, fs::path> images;
   for (const SequenceFrame& frame : frames) {
+    if (!is_complete(frame)) continue;
     const fs::path& image = frame.images.front();
     if (frame.name.empty() || frame.name == "." || frame.name == "..") {
       throw Error("The image " + image.string() +
@@ -211,6 +218,15 @@ void require_usable_names(const std::vector<SequenceFrame>& frames) {
   }
 }
 
+/// A file of one camera that is named unlike the frames, which have times, is none of them.
+void leave_out_strays(std::vector<SequenceFrame>& frames) {
+  const auto has_time = [](const SequenceFrame& frame) { return frame.nanoseconds.has_value(); };
+  const bool are_timed = std::all_of(frames.begin(), frames.end(), [&](const SequenceFrame& frame) {
+    return has_time(frame) || !is_complete(frame);
+  });
+  if (are_timed) std::erase_if(frames, std::not_fn(has_time));
+}
+
 /// Of digits alone.
 std::optional<std::int64_t> whole_number(const std::string& digits) {
   std::int64_t value = 0;
@@ -220,7 +236,7 @@ std::optional<std::int64_t> whole_number(const std::string& digits) {
 }
 
 /// The frames of all cameras together.
-std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool skip_incomplete) {
+std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool allow_incomplete) {
   if (images.empty()) throw Error("A data set has no cameras; give at least one.");
   require_different_folders(images);
   std::map<std::string, int, InOrder> counts;
@@ -235,25 +251,25 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool ski
     frame.nanoseconds = are_listed ? whole_number(key) : time_in_name(key);
     for (std::size_t i = 0; i < images.size(); ++i) {
       const auto found = images[i].of_frames.find(key);
-      if (found != images[i].of_frames.end()) {
-        frame.images.push_back(found->second);
-      } else if (!skip_incomplete) {
+      const bool is_there = found != images[i].of_frames.end();
+      if (!is_there && !allow_incomplete) {
         throw Error("The frame " + key + " has no image in " + images[i].folder.string() + " (" +
                     std::to_string(images[i].of_frames.size()) + " of " +
                     std::to_string(counts.size()) +
                     " frames have one); add it, or skip incomplete frames.");
       }
+      frame.images.push_back(is_there ? found->second : fs::path());
     }
-    if (frame.images.size() != images.size()) continue;
-    frame.name = frame.images.front().stem().string();
+    frame.name = first_image(frame).stem().string();
     frames.push_back(std::move(frame));
   }
-  if (frames.empty()) {
+  if (std::none_of(frames.begin(), frames.end(), is_complete)) {
     throw Error("No frame has images of all cameras, beginning with those in " +
                 images.front().folder.string() +
                 "; images of one frame must have equal names or times.");
   }
   require_usable_names(frames);
+  leave_out_strays(frames);
   // Fractions of a second in names are of any number of digits: 7.5 is after 7.25.
   if (have_times(frames)) {
     std::stable_sort(frames.begin(), frames.end(),
@@ -290,25 +306,30 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
   return whole_number(nanoseconds);
 }
 
+bool is_complete(const SequenceFrame& frame) {
+  return std::none_of(frame.images.begin(), frame.images.end(),
+                      [](const fs::path& image) { return image.empty(); });
+}
+
 std::vector<SequenceFrame> read_sequence(const std::vector<fs::path>& camera_folders,
-                                         bool skip_incomplete) {
+                                         bool allow_incomplete) {
   std::vector<Images> images;
   for (const fs::path& folder : camera_folders) {
-    images.push_back(images_of(folder, skip_incomplete));
+    images.push_back(images_of(folder, allow_incomplete));
   }
-  return frames_of(images, skip_incomplete);
+  return frames_of(images, allow_incomplete);
 }
 
 std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
-                                         bool skip_incomplete) {
+                                         bool allow_incomplete) {
   if (!is_folder(folder)) {
     throw Error("There is no folder " + folder.string() + "; check the path.");
   }
   std::vector<Images> images;
   for (const int camera : cameras) {
-    images.push_back(images_of(camera_folder(folder, camera), skip_incomplete));
+    images.push_back(images_of(camera_folder(folder, camera), allow_incomplete));
   }
-  return frames_of(images, skip_incomplete);
+  return frames_of(images, allow_incomplete);
 }
 
 }  // namespace widestereo

@@ -561,6 +561,19 @@ TEST_F(SequencePoses, FramesWithOtherPosesAreMatchedAgain) {
   EXPECT_NE(outcome.output.find("002: "), std::string::npos) << outcome.output;
 }
 
+TEST_F(SequencePoses, AreOfAllFramesAlsoOfThoseLeftOut) {
+  fs::remove(folder_ / "data/cam1/001.png");
+  const Outcome outcome = run(with("camera.txt", "out") + "--skip-incomplete");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("1 of 3 frames are left out, as a camera lacks them; the first is "
+                                "001."),
+            std::string::npos)
+      << outcome.output;
+  ASSERT_EQ(record()["frames"].size(), 2u);
+  EXPECT_EQ(record()["frames"][1]["name"], "002");
+  EXPECT_NE(record()["frames"][1]["pose"].dump().find("0.06"), std::string::npos);
+}
+
 TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
   const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +
                                   " -o " + file("out") + quick + "--min-views 1 ";

@@ -29,9 +29,12 @@ class Sequences : public ::testing::Test {
   std::string error(const std::vector<int>& cameras = {0, 1}) const {
     return error_of([&] { read_sequence(folder_.path(), cameras); });
   }
+  /// Of those that all cameras have.
   std::vector<std::string> names(const std::vector<SequenceFrame>& frames) const {
     std::vector<std::string> names;
-    for (const SequenceFrame& frame : frames) names.push_back(frame.name);
+    for (const SequenceFrame& frame : frames) {
+      if (is_complete(frame)) names.push_back(frame.name);
+    }
     return names;
   }
   TemporaryFolder folder_;
@@ -170,6 +173,29 @@ TEST_F(Sequences, ListedFilesThatAreMissingMakeFramesIncomplete) {
   // Before hours of matching, not after them.
   EXPECT_THAT(error(), HasSubstr("The frame 300 has no image " +
                                  (folder_ / "mav0/cam0/data/c.png").string()));
+}
+
+TEST_F(Sequences, IncompleteFramesKeepTheirPlaceAmongTheOthers) {
+  for (const char* image : {"cam0/0.png", "cam1/0.png", "cam1/1.png", "cam0/2.png", "cam1/2.png"}) {
+    add(image);
+  }
+  const auto frames = read_sequence(folder_.path(), {0, 1}, true);
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(names(frames), (std::vector<std::string>{"0", "2"}));
+  EXPECT_EQ(frames[1].name, "1");
+  EXPECT_EQ(frames[1].images, (std::vector<fs::path>{"", folder_ / "cam1/1.png"}));
+}
+
+TEST_F(Sequences, StraysAreNoFramesWhereFramesHaveTimes) {
+  for (const char* time : {"1403715273262142976", "1403715273312143104"}) {
+    for (const char* camera : {"cam0/", "cam1/"}) add(camera + std::string(time) + ".png");
+  }
+  add("cam0/1403715273362142976.png");
+  add("cam1/thumbnail.png");
+  const auto frames = read_sequence(folder_.path(), {0, 1}, true);
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(names(frames).size(), 2u);
+  for (const SequenceFrame& frame : frames) EXPECT_TRUE(frame.nanoseconds) << frame.name;
 }
 
 TEST_F(Sequences, EachCameraHasAFolderOfItsOwn) {
@@ -396,6 +422,10 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
     trajectory[i].world_from_body.translation().x() = i;
   }
   std::vector<SequenceFrame> frames(3);
+  std::vector<StampedPose> timeless = trajectory;
+  timeless[1].seconds = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, timeless, 0.01, "p"); }),
+              HasSubstr("p: pose 2 has no finite time"));
   EXPECT_EQ(poses_of_frames(frames, {0, 2}, trajectory, 0.01, "p")[1].translation().x(), 2);
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {3}, trajectory, 0.01, "p"); }),
               HasSubstr("The sequence has no frame number 3 among its 3"));
