@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "option_checks.h"
 #include "result_folder.h"
+#include "size_settings.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -84,6 +85,8 @@ void run_evaluate(EvaluateArguments a) {
     truth.field_of_view = read_labels(a.field_of_view);
   }
   const cv::Mat prediction = ws::read_map(a.prediction, a.png_scale);
+  require_same_size(prediction, a.prediction, truth.distance, a.truth,
+                    "score maps that were matched at that size, without --max-image-size");
   const cv::Mat normals = a.normals.empty() ? cv::Mat() : ws::read_map(a.normals);
   const ws::Rig rig = ws::read_calibration(a.calibration, prediction.size()).rig;
   const int views = static_cast<int>(rig.views.size());

@@ -5,8 +5,19 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/validation.h"
+#include "widestereo/error.h"
 
 namespace ws = widestereo;
+
+void require_same_size(const cv::Mat& map, const std::string& name, const cv::Mat& other,
+                       const std::string& other_name, const std::string& remedy) {
+  if (map.size() == other.size()) return;
+  const auto text = [](cv::Size size) {
+    return std::to_string(size.width) + "x" + std::to_string(size.height);
+  };
+  throw ws::Error(name + " is " + text(map.size()) + " pixels, but " + other_name + " is " +
+                  text(other.size()) + "; " + remedy + ".");
+}
 
 void SizeSettings::add_to(CLI::App& command, const std::string& help) {
   command.add_option("--max-image-size", largest_side_, help)

@@ -40,6 +40,8 @@ void run_synthesis(const SynthesisArguments& a) {
   const cv::Mat distance = ws::read_map(a.distance, a.png_scale);
   image = a.size.reduced(image, rig.views[0], a.image);
   other = a.size.reduced(other, rig.views[1], a.other);
+  require_same_size(distance, a.distance, image, a.image,
+                    "give the --max-image-size that the distances were matched with");
   const ws::SynthesisedView synthesised = ws::synthesise_view(
       distance, a.size.reduced(rig.views[0]), other, a.size.reduced(rig.views[1]));
   const ws::SynthesisScores scores = ws::synthesis_scores(distance, image, synthesised);

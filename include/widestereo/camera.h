@@ -86,11 +86,11 @@ Camera whole_sphere(int width, int height);
 /// `name` (for example "camchain.yaml: cam0") begins the message.
 void validate(const Camera& camera, const std::string& name);
 
-/// Projects a point or direction (any positive scale) in the camera frame to a pixel. The camera
-/// must be valid here, in unproject(), PreparedCamera and model_max_theta(), which do not check it:
-/// where validate() throws, their results are unspecified. Returns false when the point lies
-/// outside the model's exact domain or the field of view; pixels outside the image are returned as
-/// true: the caller decides. `pixel` is unspecified when false.
+/// Projects a point or direction (of any length whose square is finite) in the camera frame to a
+/// pixel. The camera must be valid here, in unproject(), PreparedCamera and model_max_theta(),
+/// which do not check it: where validate() throws, their results are unspecified. Returns false
+/// when the point lies outside the model's exact domain or the field of view; pixels outside the
+/// image are returned as true: the caller decides. `pixel` is unspecified when false.
 bool project(const Camera& camera, const Eigen::Vector3d& point, Eigen::Vector2d& pixel);
 
 /// As project(), with the derivative of the pixel by the point (pixels per metre).

@@ -41,7 +41,7 @@ using MapsOfView = std::function<ViewMaps(std::size_t view)>;
 /// distance that each was seen from; its confidence that of the surest. A point that more views see
 /// through, to a farther surface, than have it is left out, unless min_views is 1. The same input
 /// gives the same cloud. `progress` is told the share done. Throws Error when maps do not fit their
-/// view, and what `maps` throws.
+/// view, for views that are not valid and limits below 0 or NaN, and what `maps` throws.
 PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
                 const MapsOfView& maps, const FusionOptions& options = {},
                 const std::function<void(double)>& progress = {});

@@ -34,14 +34,14 @@ cv::Mat read_grey_levels(const std::filesystem::path& path);
 cv::Mat read_mask(const std::filesystem::path& path);
 
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm, .exr (one channel, R G B
-/// or X Y Z) or .png (16 bit, divided by `png_scale`, which is the PNG units per metre). Throws
-/// Error (missing, truncated, damaged, no such map).
+/// or X Y Z) or .png (16 bit, divided by `png_scale`, which is the PNG units per metre,
+/// above 0). Throws Error (missing, truncated, damaged, no such map, no such scale).
 cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);
 
 /// Writes a CV_32FC1 or CV_32FC3 (x y z) map by extension: .tiff (32-bit float), .pfm, .exr (32-bit
 /// float, channel Y or R G B), or .png (16 bit, CV_32FC1 only: round(value * png_scale), 0 where
-/// not positive or not representable). Throws Error for empty maps, other types and extensions, and
-/// as write_file() does.
+/// not positive or not representable). Throws Error for empty maps, other types, extensions and
+/// scales, and as write_file() does.
 void write_map(const std::filesystem::path& path, const cv::Mat& map, double png_scale = 1000.0);
 
 /// Writes an 8- or 16-bit image (PNG, JPEG, ... by extension). Throws Error for empty images, where

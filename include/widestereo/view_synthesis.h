@@ -25,6 +25,7 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
 /// Quality without ground truth: correlation (ZNCC) of the view's image and the synthesised one in
 /// windows of 11x11 pixels, of which 70 % or more are visible and whose grey levels deviate by 3 or
 /// more. An image that took no part in matching makes it independent of the matcher's own cost.
+/// Shares and means over nothing are NaN (null in JSON).
 struct SynthesisScores {
   double visible = 0;  ///< share of the pixels with a distance that the other view sees
   long windows = 0;    ///< scored

@@ -225,7 +225,7 @@ class Reader {
         if (complete) matrix(y, x) = rows[y][x].get<double>();
       }
     }
-    if (!complete) fail(i, "\"transform_matrix\" (4x4) is missing.");
+    if (!complete) fail(i, "\"transform_matrix\" (4x4 numbers) is missing or incomplete.");
     const Eigen::Matrix3d axes = Eigen::Vector3d(1, -1, -1).asDiagonal();
     const std::string what = "The transform_matrix of frame " + std::to_string(i);
     require_last_row(document_, what, matrix.row(3));

@@ -8,8 +8,11 @@
 #include <utility>
 
 #include "calibration/match_rays.h"
+#include "geometry/validation.h"
 #include "statistics/percentile.h"
 #include "statistics/robust.h"
+#include "text/number.h"
+#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
 namespace widestereo {
@@ -190,7 +193,12 @@ double blur_of_finer_pixels(const View& view, const View& other) {
 }
 
 cv::Mat blurred(const cv::Mat& image, double blur) {
-  if (blur <= 0) return image;
+  if (!(blur >= 0 && blur <= most_blur)) {
+    throw Error("A blur of " + text_of(blur) + " pixels is not possible; give 0 to " +
+                text_of(most_blur) + ".");
+  }
+  require_pixels(image, "The image to blur");
+  if (blur == 0) return image;
   cv::Mat result;
   cv::GaussianBlur(image, result, {}, blur, blur, cv::BORDER_REPLICATE);
   return result;

@@ -121,10 +121,9 @@ SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
       scores.above_0_9 += zncc > 0.9 ? 1 : 0;
     }
   }
-  scores.visible =
-      with_distance > 0 ? static_cast<double>(visible) / static_cast<double>(with_distance) : 0;
+  scores.visible = static_cast<double>(visible) / static_cast<double>(with_distance);
   for (double* sum : {&scores.mean, &scores.above_0_7, &scores.above_0_8, &scores.above_0_9}) {
-    if (scores.windows > 0) *sum /= static_cast<double>(scores.windows);
+    *sum /= static_cast<double>(scores.windows);
   }
   return scores;
 }

@@ -18,6 +18,7 @@
 #include "io/exr.h"
 #include "io/pfm.h"
 #include "text/lower_case.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -185,6 +186,11 @@ cv::Mat to_png16(const cv::Mat& map, double scale) {
   return result;
 }
 
+void require_png_scale(double scale) {
+  if (std::isfinite(scale) && scale > 0) return;
+  throw Error("The scale of PNG maps is " + text_of(scale) + "; give a number above 0.");
+}
+
 }  // namespace
 
 cv::Mat read_image(const fs::path& path) {
@@ -282,6 +288,7 @@ cv::Mat read_grey_levels(const std::filesystem::path& path) {
 }
 
 cv::Mat read_map(const fs::path& path, double png_scale) {
+  require_png_scale(png_scale);
   const std::string extension = extension_of(path);
   if (extension == ".pfm") return read_pfm(path, read_bytes(path));
   if (extension == ".exr") return read_exr(path, read_bytes(path));
@@ -301,6 +308,7 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
 
 void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
   require_pixels(map, "Cannot write " + path.string() + ": the map");
+  require_png_scale(png_scale);
   if (map.type() != CV_32FC1 && map.type() != CV_32FC3) {
     throw Error("Cannot write " + path.string() + ": a map needs one or three float channels.");
   }

@@ -168,6 +168,10 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
 
 cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
                       cv::Size size) {
+  if (size.width < 1 || size.height < 1) {
+    throw Error("A picture of a cloud cannot have " + std::to_string(size.width) + "x" +
+                std::to_string(size.height) + " pixels; give one or more both ways.");
+  }
   cv::Mat picture(size, CV_8UC3, no_value);
   cv::Mat_<float> nearest(size, std::numeric_limits<float>::max());
   const Eigen::Isometry3d viewer = world_from_viewer.inverse();
@@ -247,6 +251,7 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
     height = std::max(height, picture.rows);
     pictures.push_back(picture);
   }
+  columns = std::min(columns, static_cast<int>(panels.size()));
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
   cv::Mat sheet(rows * (height + title + gap) + gap, columns * (width + gap) + gap, CV_8UC3,
                 paper_colour);

@@ -59,7 +59,8 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
                        1};
       if (!normals.empty()) {
         const cv::Vec3f& n = normals.at<cv::Vec3f>(y, x);
-        point.normal = rotation * Eigen::Vector3f(n[0], n[1], n[2]);
+        const Eigen::Vector3f normal(n[0], n[1], n[2]);
+        if (normal.allFinite()) point.normal = rotation * normal;
       }
       if (!colours.empty()) {
         const cv::Vec3b& bgr = colours.at<cv::Vec3b>(y, x);

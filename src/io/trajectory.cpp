@@ -188,6 +188,10 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
   const auto is_earlier = [](const StampedPose& a, const StampedPose& b) {
     return a.seconds < b.seconds;
   };
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    if (std::isfinite(trajectory[i].seconds)) continue;
+    throw Error(name + ": pose " + std::to_string(i + 1) + " has no finite time; give it one.");
+  }
   std::vector<Eigen::Isometry3d> poses;
   if (!have_times(frames)) {
     if (trajectory.size() != frames.size()) {

@@ -14,6 +14,7 @@
 #include "geometry/distance.h"
 #include "geometry/validation.h"
 #include "io/point_cloud.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -369,6 +370,20 @@ class Fusion {
   PointCloud points_;
 };
 
+void require_usable(const FusionOptions& options) {
+  if (options.min_views < 1) {
+    throw Error("Fusion with points of at least " + std::to_string(options.min_views) +
+                " views is not possible; give 1 or more.");
+  }
+  for (const auto& [limit, name] : {std::pair(options.max_relative, "difference of distance"),
+                                    std::pair(options.max_pixels, "displacement"),
+                                    std::pair(options.max_normal_angle, "angle of normals")}) {
+    if (limit >= 0) continue;  // false for NaN
+    throw Error("The largest " + std::string(name) + " of fusion is " + text_of(limit) +
+                "; give 0 or more.");
+  }
+}
+
 }  // namespace
 
 PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
@@ -382,6 +397,8 @@ PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<st
   for (const std::vector<std::size_t>& list : others) {
     for (const std::size_t other : list) require_number(other, views.size(), "view", "The fusion");
   }
+  require_usable(options);
+  for (const View& view : views) require_valid(view, "The fusion");
   if (views.empty()) return {};
   std::vector<std::vector<std::size_t>> distinct;
   for (std::size_t i = 0; i < views.size(); ++i) {

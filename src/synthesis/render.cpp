@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 
+#include "geometry/validation.h"
+
 namespace widestereo::synthesis {
 namespace {
 
@@ -110,6 +112,7 @@ class ViewRenderer {
 RenderedPair render(const Scene& scene, const Rig& rig, std::uint32_t seed) {
   RenderedPair pair;
   pair.rig = rig;
+  for (const View& view : rig.views) require_valid(view, "The rig to render");
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     const View& other = rig.views[(i + 1) % rig.views.size()];
     pair.views.push_back(ViewRenderer(scene, rig.views[i], other, seed).render());

@@ -38,13 +38,15 @@ VkDescriptorBufferInfo part_of_buffer(const Conversion& conversion, int height,
   const VkPhysicalDeviceLimits& limits = context.properties().limits;
   const VkDeviceSize alignment = std::max(limits.minStorageBufferOffsetAlignment, word);
   const VkDeviceSize start = conversion.offset / alignment * alignment;
-  const VkDeviceSize end = conversion.offset +
-                           conversion.pitch * static_cast<VkDeviceSize>(height - 1) +
-                           conversion.row_bytes;
-  const VkDeviceSize bytes = (end - start + word - 1) / word * word;
-  if (bytes > limits.maxStorageBufferRange) {
-    throw Error("An image or a map reaches over " + std::to_string(bytes) +
-                " bytes of its buffer; the maxStorageBufferRange of the Vulkan device " +
+  // 32 bits of the limit and of a pitch within it leave room for all rows in 64.
+  const VkDeviceSize pitch = std::min<VkDeviceSize>(conversion.pitch, UINT32_MAX);
+  const VkDeviceSize length = conversion.offset - start +
+                              pitch * static_cast<VkDeviceSize>(height - 1) + conversion.row_bytes;
+  const VkDeviceSize bytes = (length + word - 1) / word * word;
+  if (bytes > limits.maxStorageBufferRange || pitch != conversion.pitch) {
+    throw Error("An image or a map with a pitch of " + std::to_string(conversion.pitch) +
+                " bytes reaches over " + std::to_string(bytes) +
+                " bytes of its buffer or more; the maxStorageBufferRange of the Vulkan device " +
                 context.name() + " is " + std::to_string(limits.maxStorageBufferRange) +
                 "; use a smaller pitch.");
   }

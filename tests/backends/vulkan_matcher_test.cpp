@@ -564,8 +564,10 @@ TEST(VulkanApplications, WhatDoesNotFitIsOneSentence) {
   bad.offset = 3;
   EXPECT_THAT(error(bad, {}), HasSubstr("offset and pitch must be multiples of 2"));
   bad = good[0];
-  bad.pitch = VkDeviceSize{1} << 40;
-  EXPECT_THAT(error(bad, {}), HasSubstr("maxStorageBufferRange"));
+  for (const VkDeviceSize pitch : {VkDeviceSize{1} << 40, VkDeviceSize{1} << 63}) {
+    bad.pitch = pitch;
+    EXPECT_THAT(error(bad, {}), HasSubstr("maxStorageBufferRange"));
+  }
   VulkanViewMaps maps;
   maps.normals = {good[0].buffer, 0, 4 * side};
   EXPECT_THAT(error(good[0], maps), HasSubstr("The normal map of cam0"));

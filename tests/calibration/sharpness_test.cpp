@@ -67,6 +67,13 @@ std::optional<SharpnessDifference> compare(const cv::Mat& first, const cv::Mat& 
   return compare_sharpness(view(), view(-0.1), first, second, matches);
 }
 
+TEST(Sharpness, BlursThatAreNoneAreRefused) {
+  for (const double blur : {-1.0, 1e9, static_cast<double>(NAN)}) {
+    EXPECT_EQ(test::error_of([&] { blurred(scene(), blur); }).find("A blur of"), 0u) << blur;
+  }
+  EXPECT_EQ(test::error_of([] { blurred({}, 1); }).find("The image to blur is empty"), 0u);
+}
+
 TEST(Sharpness, DifferenceIsTheBlurThatWasAdded) {
   for (const double blur : {0.9, 1.2, 2.0}) {
     const cv::Mat sharp = grey_levels(scene());

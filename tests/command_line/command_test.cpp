@@ -595,7 +595,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   expect_error("evaluate " + file("left.png") + common, "left.png");
   expect_error("evaluate " + file("prediction.tiff"), "--truth");
   cv::imwrite(file("half.tiff"), prediction(cv::Rect(0, 0, 48, 96)));
-  expect_error("evaluate " + file("half.tiff") + common, "48x96");
+  expect_error("evaluate " + file("half.tiff") + common, "48x96 pixels, but ");
   for (const char* source : {"7", "0", "-1"}) {
     expect_error("evaluate " + file("prediction.tiff") + common + " --source " + source,
                  "choose two different ones by --view and --source");

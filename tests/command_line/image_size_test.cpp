@@ -66,6 +66,7 @@ TEST_F(ImageSize, IsThatOfImagesReducedBefore) {
   const Outcome unlike = run(synthesis);
   EXPECT_EQ(unlike.exit_code, 1);
   EXPECT_NE(unlike.output.find("is 48x48 pixels"), std::string::npos) << unlike.output;
+  EXPECT_NE(unlike.output.find("give the --max-image-size"), std::string::npos) << unlike.output;
 }
 
 TEST_F(ImageSize, OfSmallerImagesStays) {

@@ -70,6 +70,7 @@ TEST_F(ViewSynthesis, LeavesOutWhatHasNoDistanceOrIsMasked) {
   rig.views[1].mask = cv::Mat(256, 256, CV_8UC1, cv::Scalar(0));
   EXPECT_EQ(scores_of(truth, rig).windows, 0);
   EXPECT_EQ(scores_of(truth, rig).visible, 0);
+  EXPECT_NE(to_json(scores_of(truth, rig)).find("\"mean_zncc\": null"), std::string::npos);
   const cv::Mat flat(256, 256, CV_8UC1, cv::Scalar(90));
   EXPECT_EQ(synthesis_scores(truth, flat, synthesised).windows, 0) << "nothing to compare";
 }

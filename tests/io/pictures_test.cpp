@@ -160,6 +160,12 @@ TEST(Pictures, ScalarsGoFromDarkToBright) {
   EXPECT_EQ(ends.at<cv::Vec3b>(1), picture.at<cv::Vec3b>(steps - 1));
 }
 
+TEST(Pictures, SheetsAreNoWiderThanTheirPanels) {
+  const cv::Mat picture = cv::Mat::ones(64, 64, CV_8UC1);
+  EXPECT_TRUE(same_bits(panel_sheet({{"a", picture}, {"b", picture}}, 1'000'000'000),
+                        panel_sheet({{"a", picture}, {"b", picture}}, 2)));
+}
+
 TEST(Pictures, SheetHoldsAllPanels) {
   const cv::Mat grey(50, 80, CV_8UC1, cv::Scalar(9));
   const cv::Mat deep(100, 160, CV_16UC3, cv::Scalar(257 * 10, 257 * 20, 257 * 30));
@@ -228,6 +234,7 @@ TEST(Pictures, RefuseWrongMaps) {
   expect([&] { with_scalar_legend({}, 0, 1); }, "picture is empty");
   expect([&] { panel_sheet({{"a", bytes}, {"b", one}}, 2); }, "panel b is CV_32FC1");
   expect([&] { panel_sheet({{"a", {}}}, 2); }, "panel a is empty");
+  expect([&] { cloud_picture({}, Eigen::Isometry3d::Identity(), {-4, 48}); }, "-4x48 pixels");
 }
 
 TEST(PointCloud, RefusesWrongMaps) {
@@ -261,6 +268,15 @@ TEST(PointCloud, PixelsWithoutARayHaveNoPoint) {
       make_point_cloud(distance, rays, {}, {}, {}, Eigen::Isometry3d::Identity());
   ASSERT_EQ(cloud.size(), 1U);
   EXPECT_EQ(cloud[0].position, Eigen::Vector3f(0, 0, 1));
+}
+
+TEST(PointCloud, NormalsThatAreNoneAreZero) {
+  const cv::Mat distance = cv::Mat::ones(1, 1, CV_32FC1);
+  const cv::Mat rays(1, 1, CV_32FC4, cv::Scalar(0, 0, 1, 1));
+  const cv::Mat normals(1, 1, CV_32FC3, cv::Scalar(0, NAN, -1));
+  const PointCloud cloud =
+      make_point_cloud(distance, rays, normals, {}, {}, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(cloud.at(0).normal, Eigen::Vector3f(0, 0, 0));
 }
 
 /// Floats are 1/16 m apart there: a camera rounded to one of them would add as much again.

@@ -463,6 +463,23 @@ TEST_F(Fusion, PixelsWithoutARayMakeNoPoints) {
   }
 }
 
+TEST_F(Fusion, RefusesLimitsAndViewsThatAreNone) {
+  const auto error = [this](const FusionOptions& options) {
+    return test::error_of([&] {
+      fuse(
+          views_, {{1}, {0}, {}}, [this](std::size_t i) { return maps_[i]; }, options);
+    });
+  };
+  EXPECT_EQ(error({}), "");
+  EXPECT_NE(error({.min_views = 0}).find("at least 0 views"), std::string::npos);
+  EXPECT_NE(error({.max_relative = NAN}).find("difference of distance of fusion is nan"),
+            std::string::npos);
+  EXPECT_NE(error({.max_pixels = -1}).find("displacement of fusion is -1"), std::string::npos);
+  EXPECT_NE(error({.max_normal_angle = NAN}).find("angle of normals"), std::string::npos);
+  views_[2].world_from_camera.translation().y() = NAN;
+  EXPECT_NE(error({}).find(views_[2].name + ": the pose is not a rigid motion"), std::string::npos);
+}
+
 TEST_F(Fusion, MapsThatDoNotFitAreNamed) {
   maps_[1].distance = cv::Mat::ones(4, 4, CV_32FC1);
   EXPECT_NE(test::error_of([this] { fuse_all(); }).find(views_[1].name), std::string::npos);

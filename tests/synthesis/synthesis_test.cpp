@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "same_bits.h"
+#include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
@@ -108,6 +109,10 @@ TEST(RenderDemo, ViewsShowTheSameSceneThroughTheirTruth) {
   EXPECT_GT(hidden, 0.8 * counts[0]);
   EXPECT_GT(counts[1], 100) << "outside";
   EXPECT_GT(counts[2], 20000) << "visible";
+}
+
+TEST(RenderDemo, NeedsPixels) {
+  for (const int size : {-5, 0}) EXPECT_THROW(render_demo(size), Error);
 }
 
 TEST(RenderDemo, IsDeterministicAndInRange) {
