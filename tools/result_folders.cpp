@@ -146,8 +146,9 @@ void ResultFolders::remove(const std::string& name) const {
   fs::rename(path, folder_ / removed, error);
   if (!error) fs::remove_all(folder_ / removed, error);
   if (error) throw ws::Error("Cannot remove " + path.string() + ": " + error.message() + ".");
-  for (fs::path parent = path.parent_path(); parent != folder_; parent = parent.parent_path()) {
-    if (!fs::remove(parent, error)) break;  // there is something else in it
+  for (fs::path parent = fs::path(name).parent_path(); !parent.empty();
+       parent = parent.parent_path()) {
+    if (!fs::remove(folder_ / parent, error)) break;  // there is something else in it
   }
 }
 

@@ -12,10 +12,9 @@ namespace widestereo {
 
 /// The images that a rig took at one time.
 struct SequenceFrame {
-  std::string name;  ///< the files' name without extension
-  std::vector<std::filesystem::path>
-      images;                               ///< one for each camera asked for, empty if it has none
-  std::optional<std::int64_t> nanoseconds;  ///< time stamp, where the data set has them
+  std::string name;                           ///< the files' name without extension
+  std::vector<std::filesystem::path> images;  ///< of each camera asked for; empty = it has none
+  std::optional<std::int64_t> nanoseconds;    ///< time stamp, where the data set has them
 };
 
 /// Nanoseconds since 1970 that the number at the end of a file's name without extension stands for,
