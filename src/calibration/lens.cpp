@@ -9,6 +9,7 @@
 
 #include "geometry/angle.h"
 #include "statistics/percentile.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -49,9 +50,8 @@ cv::Mat brightest_of(const Camera& camera, const std::vector<cv::Mat>& images) {
   for (const cv::Mat& image : images) {
     if (image.size() != brightest.size()) {
       throw Error("The rim of a lens needs images of the calibrated size, " +
-                  std::to_string(camera.width) + "x" + std::to_string(camera.height) +
-                  " pixels, not " + std::to_string(image.cols) + "x" + std::to_string(image.rows) +
-                  ".");
+                  size_text(camera.width, camera.height) + " pixels, not " +
+                  size_text(image.cols, image.rows) + ".");
     }
     cv::max(brightest, to_intensity(image, "An image"), brightest);
   }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "calibration/formats.h"
+#include "text/size_text.h"
 
 namespace widestereo::calibration {
 namespace {
@@ -299,10 +300,9 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
           "and image_height.");
     }
     if (!in_file.empty() && !image_size.empty() && in_file != image_size) {
-      document.fail("It is for images of " + std::to_string(in_file.width) + "x" +
-                    std::to_string(in_file.height) + " pixels, the given ones have " +
-                    std::to_string(image_size.width) + "x" + std::to_string(image_size.height) +
-                    ".");
+      document.fail("It is for images of " + size_text(in_file.width, in_file.height) +
+                    " pixels, the given ones have " +
+                    size_text(image_size.width, image_size.height) + ".");
     }
     require_known_xi(document, storage);
     Rig rig;

@@ -12,6 +12,7 @@
 #include "geometry/camera_parameters.h"
 #include "geometry/dual.h"
 #include "geometry/validation.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 
 namespace widestereo::kernel::dual {
@@ -207,10 +208,6 @@ bool direction_of(const Camera& c, const kernel::dual::CameraParameters& p, Vect
     }
   }
   return false;
-}
-
-std::string size_text(int width, int height) {
-  return std::to_string(width) + "x" + std::to_string(height);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/validation.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -41,9 +42,8 @@ bool is_masked(const View& view, const Eigen::Vector2d& position) {
 void require_calibrated_size(const cv::Mat& map, const View& view, const std::string& name) {
   const Camera& camera = view.camera;
   if (map.cols == camera.width && map.rows == camera.height) return;
-  throw Error(name + " is " + std::to_string(map.cols) + "x" + std::to_string(map.rows) +
-              " pixels, but the calibration of " + view.name + " is for " +
-              std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+  throw Error(name + " is " + size_text(map.cols, map.rows) + " pixels, but the calibration of " +
+              view.name + " is for " + size_text(camera.width, camera.height) +
               "; use images of the calibrated size.");
 }
 

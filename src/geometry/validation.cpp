@@ -9,6 +9,7 @@
 #include "geometry/angle.h"
 #include "text/formatted.h"
 #include "text/number.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 #include "widestereo/rig.h"
 
@@ -136,9 +137,8 @@ void require_type(const cv::Mat& map, int type, const std::string& name) {
 
 void require_size(const cv::Mat& map, cv::Size size, const std::string& name) {
   if (map.size() == size) return;
-  throw Error(name + " is " + std::to_string(map.cols) + "x" + std::to_string(map.rows) +
-              " pixels instead of " + std::to_string(size.width) + "x" +
-              std::to_string(size.height) + "; use maps of one view.");
+  throw Error(name + " is " + size_text(map.cols, map.rows) + " pixels instead of " +
+              size_text(size.width, size.height) + "; use maps of one view.");
 }
 
 void require_map(const cv::Mat& map, cv::Size size, int type, const std::string& name) {
@@ -153,9 +153,8 @@ void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name) {
   if (mask.empty()) return;
   if (mask.type() == CV_8UC1 && mask.cols == camera.width && mask.rows == camera.height) return;
-  throw Error(name + ": the mask is " + std::to_string(mask.cols) + "x" +
-              std::to_string(mask.rows) + " pixels, but the camera has " +
-              std::to_string(camera.width) + "x" + std::to_string(camera.height) +
+  throw Error(name + ": the mask is " + size_text(mask.cols, mask.rows) +
+              " pixels, but the camera has " + size_text(camera.width, camera.height) +
               "; use an 8-bit grey mask of that size.");
 }
 
