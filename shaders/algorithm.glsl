@@ -13,6 +13,7 @@
 #include "plane_fit.glsl"
 #include "regression.glsl"
 #include "transfer.glsl"
+#include "structure.glsl"
 #include "check.glsl"
 #include "ambiguity.glsl"
 #include "fill.glsl"

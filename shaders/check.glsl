@@ -9,18 +9,13 @@
 #define SUPPORT_DISPLACEMENT 1.0f
 // Inverse of the mean squared correlation of the surroundings below which next to nothing matches.
 #define EVIDENCE_SCALE 32.0f
-// Logarithm of odds per mean squared correlation of the surroundings where intensity curves.
-#define LARGEST_STRUCTURE 4.15f
-// Where differences tell how intensity curves: on lines along both diagonals by turns, which reach this far and lie up to
-// so far beside the pixel, in steps of so many pixels both ways. All lie within an image's apron.
-#define CURVATURE_RADIUS 10
-#define CURVATURE_STEP 4
-#define CURVATURE_BESIDE 6
-// Mean square of the curvature of intensity, net of noise, from which on it tells surfaces: that of a texture with a
-// standard deviation of 0.8 grey levels; its inverse.
-#define PER_CERTAIN_CURVATURE 1e5f
-// Largest variance that is taken for noise, of two grey levels: more may be fine texture.
-#define LARGEST_NOISE 6e-5f
+// What the share of the squared gradients of intensity around that lies along epipolar curves counts: so many times it,
+// less this. Up to 0.057, which errors of sampling make, it tells nothing of distances, from 0.25 on all.
+#define PER_ALONG 5.2f
+#define LESS_ALONG 0.296f
+// Inverse of the variance of slopes along epipolar curves around, net of noise's, from which on they tell surfaces: that
+// of 0.7 grey levels a pixel.
+#define PER_CERTAIN_SLOPE 1.5e5f
 // Variance that any match may leave unexplained besides noise, of 1.4 grey levels.
 #define EXPECTED_VARIANCE 3e-5f
 // Displacement of the other view's own plane (px) that says half as much against a pixel's as any can.
@@ -46,66 +41,6 @@ FN float reference_variance(CONTEXT_ARGUMENT ivec2 pixel) {
     }
   }
   return (sum_squares - sum * sum / n) / n;
-}
-
-// Squared second differences of intensities on lines, of which some are masked.
-struct Curvature {
-  float last;
-  float last_but_one;
-  float differences;
-  float sum;
-};
-
-FN void begin_curvature(OUT(Curvature) curvature) {
-  curvature.differences = 0.0f;
-  curvature.sum = 0.0f;
-}
-
-FN void begin_line(INOUT(Curvature) curvature) {
-  curvature.last = MASKED_INTENSITY;
-  curvature.last_but_one = MASKED_INTENSITY;
-}
-
-FN void add_intensity(INOUT(Curvature) curvature, float a) {
-  float difference = (a - curvature.last) - (curvature.last - curvature.last_but_one);
-  bool usable = min(a, min(curvature.last, curvature.last_but_one)) >= 0.0f;
-  curvature.differences += usable ? 1.0f : 0.0f;
-  curvature.sum += usable ? difference * difference : 0.0f;
-  curvature.last_but_one = curvature.last;
-  curvature.last = a;
-}
-
-// The variance of noise that alone would make them.
-FN float variance_of(Curvature curvature) { return curvature.sum / (6.0f * max(curvature.differences, 1.0f)); }
-
-// Variance of the noise in the reference patch, for which second differences along every other one of its rows are taken.
-FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
-  Curvature curvature;
-  begin_curvature(curvature);
-  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; dy += 2) {
-    IntensityRow row = intensity_row(CONTEXT REFERENCE, ivec2(pixel.x - WINDOW_RADIUS, pixel.y + dy));
-    begin_line(curvature);
-    for (int dx = 0; dx <= 2 * WINDOW_RADIUS; ++dx) add_intensity(curvature, intensity_in_row(row, dx));
-  }
-  return variance_of(curvature);
-}
-
-// How far intensity curves around the pixel by more than noise does, 0 to LARGEST_STRUCTURE: where it is constant or a
-// gradient, patches match anywhere, and planes are those of what lies around, or of nothing.
-FN float structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, float noise) {
-  Curvature curvature;
-  begin_curvature(curvature);
-  int way = 1;
-  for (int beside = -CURVATURE_BESIDE; beside <= CURVATURE_BESIDE; beside += 2) {
-    begin_line(curvature);
-    for (int along = -CURVATURE_RADIUS; along <= CURVATURE_RADIUS; along += CURVATURE_STEP) {
-      ivec2 q = ivec2(pixel.x + way * along + beside, pixel.y + along - way * beside);
-      add_intensity(curvature, intensity_at(CONTEXT REFERENCE, q));
-    }
-    way = -way;
-  }
-  float net = variance_of(curvature) - min(noise, LARGEST_NOISE);
-  return clamp((LARGEST_STRUCTURE * PER_CERTAIN_CURVATURE) * net, 0.0f, LARGEST_STRUCTURE);
 }
 
 // Radians that the point's direction turns in the source per unit of inverse distance.
@@ -159,6 +94,30 @@ FN vec2 support_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w,
   return vec2(supporting * share, evidence * share);
 }
 
+// What the intensities of the surroundings tell of distances, 0 to 1: by the share of their squared gradients that lies
+// along epipolar curves (x), and by the variance of the slopes there, net of noise's (y). Where intensity is constant or a
+// gradient, or changes across the curves alone, patches match anywhere, and planes are those of what lies around, or of
+// nothing.
+FN vec2 structure_of_surroundings(CONTEXT_ARGUMENT ivec2 pixel) {
+  float places = 0.0f;
+  float along = 0.0f;
+  float slope = 0.0f;
+  ivec4 grid = grid_in_image(PARAMETERS.cameras[REFERENCE].size, pixel, ivec2(-SUPPORT_RADIUS, -SUPPORT_RADIUS),
+                             SUPPORT_RADIUS, ivec2(SUPPORT_STEP, SUPPORT_STEP));
+  for (int dy = grid.y; dy <= grid.w; dy += SUPPORT_STEP) {
+    for (int dx = grid.x; dx <= grid.z; dx += SUPPORT_STEP) {
+      vec4 structure = prior_at(CONTEXT REFERENCE, ivec2(pixel.x + dx, pixel.y + dy));
+      places += structure.w;
+      along += structure.w * structure.x;
+      slope += structure.w * structure.y;
+    }
+  }
+  float share = 1.0f / max(places, 1.0f);
+  // Constants come first: of a product Mesa takes the first factor with them.
+  return vec2(clamp(PER_ALONG * along * share - LESS_ALONG, 0.0f, 1.0f),
+              clamp(PER_CERTAIN_SLOPE * slope * share, 0.0f, 1.0f));
+}
+
 // Of what the match leaves unexplained, the cost by the patch's variance, the share that noise explains: from 1 down.
 FN float share_of_noise(float cost, float variance, float noise) {
   float expected = noise + EXPECTED_VARIANCE;
@@ -183,7 +142,7 @@ struct Indications {
   float displacement;  // from the source's own plane (px)
   float support;       // of the surroundings
   float evidence;      // of the surroundings
-  float structure;     // structure_of_surroundings()
+  vec2 structure;      // structure_of_surroundings()
   float cost;          // 1 at most
   float noise_share;   // share_of_noise()
   float suspicion;     // suspicion_at_ends()
@@ -191,15 +150,16 @@ struct Indications {
 
 // Probability that the point lies within two source pixels of its true place: a logistic model, fitted to ray-traced
 // scenes (docs/accuracy.md). Planes around that agree tell less where the match leaves more unexplained than noise, as
-// they do where the scene lies beyond the range of distances. Correlation of the surroundings counts where intensity
-// curves: on blank walls with gradients of brightness everything matches. Where next to nothing matches, as in the dark
-// beyond the lens circle, planes agree because nothing contradicts them.
+// they do where the scene lies beyond the range of distances, and where there is little to tell distances by. So does
+// correlation: on blank walls everything matches. Neither tells anything where intensity changes across epipolar curves
+// alone. Where next to nothing matches, as in the dark beyond the lens circle, planes agree because nothing contradicts
+// them.
 FN float confidence_of(Indications i) {
   float doubt = i.displacement / (i.displacement + HALF_DOUBTED_DISPLACEMENT);
-  // Constants come first: of a product Mesa takes the first factor with them.
-  float log_odds = i.evidence * i.structure - 2.1f * doubt -
-                   1.34f * logarithm(1.02f - i.support) * sqrt(i.noise_share) -
-                   4.58f * i.suspicion * sqrt(i.cost) - 0.75f;
+  float agreement = -(0.69f + 0.67f * i.structure.y) * logarithm(1.02f - i.support) * sqrt(i.noise_share);
+  // Constants come first here, too.
+  float log_odds = i.structure.x * (4.03f * i.structure.y * i.evidence + agreement) - 1.91f * doubt -
+                   5.44f * i.suspicion * sqrt(i.cost) - 0.935f;
   return min(EVIDENCE_SCALE * i.evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
@@ -262,19 +222,19 @@ FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
 }
 
 // Stores the relative difference and the displacement from the nearest of the sources' own planes, the confidence and the
-// reasons.
+// reasons; the pixels must have been through structure_pixel().
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   Comparison c;
   float confidence = 0.0f;
   if (compare_with_others(CONTEXT pixel, c)) {
-    float noise = reference_noise(CONTEXT pixel);
     Indications i;
     i.displacement = c.difference.y >= UNKNOWN_DIFFERENCE ? UNCHECKED_DISPLACEMENT : c.difference.y;
     i.support = c.support.x;
     i.evidence = c.support.y;
-    i.structure = structure_of_surroundings(CONTEXT pixel, noise);
+    i.structure = structure_of_surroundings(CONTEXT pixel);
     i.cost = min(c.held.w, 1.0f);
-    i.noise_share = share_of_noise(i.cost, reference_variance(CONTEXT pixel), noise);
+    i.noise_share =
+        share_of_noise(i.cost, reference_variance(CONTEXT pixel), prior_at(CONTEXT REFERENCE, pixel).z);
     i.suspicion = suspicion_at_ends(CONTEXT c.w, c.speed);
     confidence = confidence_of(i);
     if (confidence < PARAMETERS.acceptance.x) c.reasons |= REASON_LOW_CONFIDENCE;

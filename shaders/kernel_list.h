@@ -28,4 +28,5 @@ KERNEL(ambiguity, REFERENCE)        // adds to the checks where another place ma
 KERNEL(adopt_point, REFERENCE)      // takes regressed planes over whose costs follow later
 KERNEL(renew_point, REFERENCE)      // starts a view from moved planes whose costs follow later
 KERNEL(check_for_vote, REFERENCE)   // consistency and reasons, and what the other view shows
+KERNEL(structure, REFERENCE)        // what the intensities around tell distances by (kept where the priors go)
 #undef KERNEL

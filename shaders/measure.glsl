@@ -34,16 +34,24 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
          vec2(jy.y * along.x - jy.x * along.y, jx.x * along.y - jx.y * along.x);
 }
 
-// The reference's intensity at q and its change per pixel of displacement in the source; false where it is not seen.
-FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity, OUT(float) slope) {
+// The reference's intensity at q and its change per pixel; false where it is not seen.
+FN bool gradient_at(CONTEXT_ARGUMENT ivec2 q, OUT(float) intensity, OUT(vec2) gradient) {
   // Of the texels around it, those above and to the left, and those to the right and below.
   ivec2 own = ivec2(TEXELS_PER_PIXEL * q.x, TEXELS_PER_PIXEL * q.y);
   vec4 before = texel_taps(CONTEXT REFERENCE, ivec2(own.x - 1, own.y - 1));
   vec4 after = texel_taps(CONTEXT REFERENCE, own);
   intensity = after.x;
-  slope = 0.5f * float(TEXELS_PER_PIXEL) *
-          ((after.y - before.z) * direction.x + (after.z - before.y) * direction.y);
+  float per_pixel = 0.5f * float(TEXELS_PER_PIXEL);
+  gradient = vec2(per_pixel * (after.y - before.z), per_pixel * (after.z - before.y));
   return min(min(min(before.z, after.y), min(before.y, after.z)), intensity) >= 0.0f;
+}
+
+// The same, with its change per pixel of displacement in the source.
+FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity, OUT(float) slope) {
+  vec2 gradient;
+  bool seen = gradient_at(CONTEXT q, intensity, gradient);
+  slope = gradient.x * direction.x + gradient.y * direction.y;
+  return seen;
 }
 
 // The source that tells most of those whose own planes agree with the pixel's, for the point may be hidden in others; of

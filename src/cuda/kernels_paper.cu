@@ -9,9 +9,9 @@ struct Get {
   KernelTable operator()(C) const {
     // A pixel tries up to eight planes there, else one.
     using Iterate = std::conditional_t<C::warp == WARP_EXACT && C::source_count == 1, Tiled<C>, C>;
-    static const KernelEntry entries[] = {KERNEL_ENTRY(initialise, C),
-                                          KERNEL_ENTRY(iterate, Iterate),
-                                          KERNEL_ENTRY(transfer_gather, C), KERNEL_ENTRY(check, C)};
+    static const KernelEntry entries[] = {
+        KERNEL_ENTRY(initialise, C), KERNEL_ENTRY(iterate, Iterate),
+        KERNEL_ENTRY(transfer_gather, C), KERNEL_ENTRY(structure, C), KERNEL_ENTRY(check, C)};
     return table_of(entries);
   }
 };

@@ -187,6 +187,7 @@ class Builder {
   }
 
   Schedule finished() {
+    add(Kernel::structure, pass_of(views_of(0)), views_of(0), 0);
     add(Kernel::check, pass_of(views_of(0)), views_of(0), 0);
     if (options_.ambiguity_margin > 0) find_ambiguity();
     fill(options_.fill_radius, reason_no_ray);

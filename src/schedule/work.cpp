@@ -135,8 +135,10 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
       return {ray | plane | nearest, 0, winner};
     case Kernel::transfer_gather:
       return {seen | winner | plane, texels, plane};
+    case Kernel::structure:
+      return {seen | texels | plane, sources > 1 ? plane : 0, prior};
     case Kernel::check:
-      return {seen | plane, plane, checks};
+      return {seen | plane | prior, plane, checks};
     case Kernel::check_for_vote:
       return {seen | plane, plane | texels, checks};
     case Kernel::ambiguity:

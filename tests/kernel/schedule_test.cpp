@@ -164,10 +164,11 @@ TEST(Passes, OfNormalsComeLastAndMayBeVotedOn) {
     return kernels;
   };
   using ::testing::ElementsAre;
-  EXPECT_THAT(last_kernels(true), ElementsAre(Kernel::measure, Kernel::regress, Kernel::adopt_point,
-                                              Kernel::vote_normal, Kernel::adopt, Kernel::check));
-  EXPECT_THAT(last_kernels(false),
-              ElementsAre(Kernel::measure, Kernel::regress, Kernel::adopt, Kernel::check));
+  EXPECT_THAT(last_kernels(true),
+              ElementsAre(Kernel::measure, Kernel::regress, Kernel::adopt_point,
+                          Kernel::vote_normal, Kernel::adopt, Kernel::structure, Kernel::check));
+  EXPECT_THAT(last_kernels(false), ElementsAre(Kernel::measure, Kernel::regress, Kernel::adopt,
+                                               Kernel::structure, Kernel::check));
 }
 
 TEST(Passes, OfRepairsSpareMatchesAndThoseOfTheFillingDoNot) {
