@@ -29,16 +29,32 @@ FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
   return sum / (6.0f * max(differences, 1.0f));
 }
 
-// Stores the share of the squared gradients of intensity that lies along the epipolar curve, the variance of the slopes
-// there (per pixel of the reference), net of noise's, the variance of that noise, and 1 where this is known, else 0.
+// How much narrower than high a pixel is, by the squares of the angles that it spans: 1 but for panoramas and wide lenses.
+FN float squeeze_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  int towards_middle = 2 * pixel.x < size.x ? 1 : -1;
+  int towards_equator = 2 * pixel.y < size.y ? 1 : -1;
+  vec4 beside = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x + towards_middle, pixel.y)));
+  vec4 below = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x, pixel.y + towards_equator)));
+  vec3 width = vec3(beside.x, beside.y, beside.z) - ray;
+  vec3 height = vec3(below.x, below.y, below.z) - ray;
+  float width2 = dot(width, width);
+  float height2 = dot(height, height);
+  bool known = beside.w != 0.0f && below.w != 0.0f && width2 > 0.0f && height2 > 0.0f;
+  return known ? width2 / height2 : 1.0f;
+}
+
+// Stores the share of the squared gradients of intensity (per angle) that lies along the epipolar curve, the variance of
+// the slopes there (per pixel of the reference), net of noise's, the variance of that noise, and 1 where this is known, else 0.
 FN void structure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec4 structure = vec4(0.0f, 0.0f, 0.0f, 0.0f);
   if (is_usable(CONTEXT pixel, usable_ray) && held.w < INVALID_COST) {
     vec3 m = vec3(held.x, held.y, held.z);
+    vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
     vec2 velocity;
-    int source = agreeing_source(CONTEXT pixel, vec3(usable_ray.x, usable_ray.y, usable_ray.z), m, velocity);
+    int source = agreeing_source(CONTEXT pixel, ray, m, velocity);
     vec2 direction = reference_direction(CONTEXT source, pixel, m, (1.0f / max(length(velocity), 1e-9f)) * velocity);
     float n = 0.0f;
     float sum = 0.0f;
@@ -65,8 +81,11 @@ FN void structure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float noise = reference_noise(CONTEXT pixel);
     // Differences over two pixels have half the noise's variance, those of half pixels up to 0.8 times as much.
     float net = variance - 0.5f * min(noise, LARGEST_NOISE);
+    float squeeze = squeeze_of(CONTEXT pixel, ray);
+    float angle2 = squeeze * direction.x * direction.x + direction.y * direction.y;
+    float share = along / max(angle2 * (all.x / squeeze + all.y), 1e-12f);
     // Not at an epipole, nor where the source does not see the point.
-    structure = vec4(along / max(length2 * (all.x + all.y), 1e-12f), net, noise, n > 0.0f && length2 > 0.0f ? 1.0f : 0.0f);
+    structure = vec4(share, net, noise, n > 0.0f && length2 > 0.0f ? 1.0f : 0.0f);
   }
   store_prior(CONTEXT REFERENCE, pixel, structure);
 }
