@@ -136,7 +136,7 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
     case Kernel::transfer_gather:
       return {seen | winner | plane, texels, plane};
     case Kernel::structure:
-      return {seen | texels | plane, sources > 1 ? plane : 0, prior};
+      return {seen | texels | plane, sources > 1 ? 0U | plane : 0U, prior};
     case Kernel::check:
       return {seen | plane | prior, plane, checks};
     case Kernel::check_for_vote:
