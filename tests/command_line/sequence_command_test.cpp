@@ -318,7 +318,7 @@ TEST_F(SequenceCommand, ASceneCutIsMatchedAnew) {
 
 TEST_F(SequenceCommand, ASceneCutIsNoticedWhereARunWasResumed) {
   add_frame(0, "002", 8);
-  const std::string options = "--no-motion --restart-below 0.9 ";
+  const std::string options = "--no-motion --restart-below 0.94 ";
   ASSERT_EQ(run(sequence() + options + "--count 2").exit_code, 0);
   ASSERT_EQ(record()["frames"][1]["start"], "warm") << record()["frames"];
   ASSERT_EQ(run(sequence() + options).exit_code, 0);
