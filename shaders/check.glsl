@@ -62,11 +62,8 @@ FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
   if (speed > 0.0f) return speed;
   float turn = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) turn = max(turn, turn_in_source(CONTEXT source_at(CONTEXT i), ray, w));
-  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  int towards_middle = 2 * pixel.x < size.x ? 1 : -1;
-  vec4 beside = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x + towards_middle, pixel.y)));
-  float angle = length(vec3(beside.x, beside.y, beside.z) - ray);
-  return beside.w != 0.0f && angle > 0.0f ? turn / angle : 0.0f;
+  float angle = length(step_of_ray(CONTEXT pixel, ray, ivec2(1, 0)));
+  return angle > 0.0f ? turn / angle : 0.0f;
 }
 
 // Of the surrounding planes: the share that puts the pixel's point where its own does (x) and the mean of their squared

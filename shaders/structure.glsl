@@ -29,23 +29,26 @@ FN float reference_noise(CONTEXT_ARGUMENT ivec2 pixel) {
   return sum / (6.0f * max(differences, 1.0f));
 }
 
+// From the pixel's ray to that of the next pixel along `axis`, towards the image's middle; zero where that has none.
+FN vec3 step_of_ray(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, ivec2 axis) {
+  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
+  ivec2 step = ivec2(2 * pixel.x < size.x ? axis.x : -axis.x, 2 * pixel.y < size.y ? axis.y : -axis.y);
+  vec4 next = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x + step.x, pixel.y + step.y)));
+  return next.w != 0.0f ? vec3(next.x, next.y, next.z) - ray : vec3(0.0f, 0.0f, 0.0f);
+}
+
 // How much narrower than high a pixel is, by the squares of the angles that it spans: 1 but for panoramas and wide lenses.
 FN float squeeze_of(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray) {
-  ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  int towards_middle = 2 * pixel.x < size.x ? 1 : -1;
-  int towards_equator = 2 * pixel.y < size.y ? 1 : -1;
-  vec4 beside = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x + towards_middle, pixel.y)));
-  vec4 below = ray_at(CONTEXT REFERENCE, nearest_in_image(size, ivec2(pixel.x, pixel.y + towards_equator)));
-  vec3 width = vec3(beside.x, beside.y, beside.z) - ray;
-  vec3 height = vec3(below.x, below.y, below.z) - ray;
+  vec3 width = step_of_ray(CONTEXT pixel, ray, ivec2(1, 0));
+  vec3 height = step_of_ray(CONTEXT pixel, ray, ivec2(0, 1));
   float width2 = dot(width, width);
   float height2 = dot(height, height);
-  bool known = beside.w != 0.0f && below.w != 0.0f && width2 > 0.0f && height2 > 0.0f;
-  return known ? width2 / height2 : 1.0f;
+  return width2 > 0.0f && height2 > 0.0f ? width2 / height2 : 1.0f;
 }
 
 // Stores the share of the squared gradients of intensity (per angle) that lies along the epipolar curve, the variance of
-// the slopes there (per pixel of the reference), net of noise's, the variance of that noise, and 1 where this is known, else 0.
+// the slopes there (per pixel of the reference), net of noise's, the variance of that noise, and 1 where this is known,
+// else 0.
 FN void structure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
