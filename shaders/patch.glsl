@@ -395,7 +395,7 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
       RayRow rays_of_row = ray_row(CONTEXT reference, ivec2(begin.x, clamp(begin.y, 0, last_row)));
       RowMap row;
       if (WARP != WARP_EXACT) row = map_row(CONTEXT start.map, float(first), float(dy));
-      UNROLL for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
+      UNROLL_COLUMNS for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {
         float a;
         vec3 direction;
 #ifdef HAS_PATCH_TILE

@@ -26,7 +26,7 @@ FN float subpixel_shift(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 d
   float sum_as = 0.0f;
   float sum_bs = 0.0f;
   float sum_ss = 0.0f;
-  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+  KEEP_LOOP for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
     int first = first_column(CONTEXT WINDOW_RADIUS, dy);
     RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
     for (int dx = 0; dx <= WINDOW_RADIUS - first; dx += COLUMN_STEP) {

@@ -220,6 +220,39 @@ TEST_P(Parity, ExactFilteringGivesTheBitsOfTheCpu) {
   }
 }
 
+// Of few enough pixels that compilers unroll the loops over them.
+TEST_P(Parity, TheSmallestPatchesGiveTheBitsOfTheCpu) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  if (const std::string why = why_bits_may_differ(*device); !why.empty()) GTEST_SKIP() << why;
+  Device cpu = Device::open("cpu");
+  const RenderedPair pair = render_demo(64);
+  for (const char* preset : {"fast", "paper"}) {
+    for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
+      SCOPED_TRACE(preset + std::to_string(static_cast<int>(warp)));
+      Options options = exact(Options::preset_named(preset));
+      std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+      options.window_radius = 1;
+      options.pattern = PatchPattern::dense;
+      options.warp = warp;
+      options.first_iterations = 2;
+      options.second_iterations = 2;
+      Matcher matcher(cpu, pair.rig, options);
+      Matcher other(*device, pair.rig, options);
+      for (const bool warm : {false, true}) {
+        const auto match = [&](Matcher& m) {
+          return warm ? m.match_next(images_of(pair), {}) : m.match(images_of(pair));
+        };
+        const StereoResult expected = match(matcher);
+        const StereoResult actual = match(other);
+        for (std::size_t view = 0; view < 2; ++view) {
+          SCOPED_TRACE(view);
+          expect_same_bits(expected.views[view], actual.views[view]);
+        }
+      }
+    }
+  }
+}
+
 TEST_P(Parity, AnyRangeOfDistancesGivesTheBitsOfTheCpu) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   if (const std::string why = why_bits_may_differ(*device); !why.empty()) GTEST_SKIP() << why;
