@@ -16,7 +16,7 @@ double largest_value(const cv::Mat& image);
 
 /// The 16-bit image of a camera with fewer bits, whose values end at `white` (4095 where it has
 /// 12), stretched to all of the 16. Throws Error for empty images and those of 8 bits, for values
-/// above, and where `white` is not positive; `name` begins the message.
+/// above, and where `white` is not between 1 and 65535; `name` begins the message.
 cv::Mat stretched(const cv::Mat& image, int white, const std::string& name);
 
 /// Grey intensities in [0, 1], CV_32FC1, of an 8- or 16-bit (or float in [0, 1]) grey, BGR or BGRA

@@ -34,8 +34,8 @@ std::optional<SharpnessDifference> compare_sharpness(const View& first, const Vi
 /// both. Throws Error for cameras that validate() refuses.
 double blur_of_finer_pixels(const View& view, const View& other);
 
-/// Blurred by a Gaussian of that standard deviation (pixels, at most most_blur); as it is for 0.
-/// Throws Error for other numbers and empty images.
+/// An image of 8 or 16 bits, or of floats, blurred by a Gaussian of that standard deviation
+/// (pixels, at most most_blur); as it is for 0. Throws Error for other numbers and empty images.
 constexpr double most_blur = 1000;
 cv::Mat blurred(const cv::Mat& image, double blur);
 

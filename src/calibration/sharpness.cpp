@@ -198,6 +198,10 @@ cv::Mat blurred(const cv::Mat& image, double blur) {
                 text_of(most_blur) + ".");
   }
   require_pixels(image, "The image to blur");
+  if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F) {
+    throw Error("The image to blur is " + cv::typeToString(image.type()) +
+                "; give one of 8 or 16 bits, or of floats.");
+  }
   if (blur == 0) return image;
   cv::Mat result;
   cv::GaussianBlur(image, result, {}, blur, blur, cv::BORDER_REPLICATE);

@@ -217,7 +217,7 @@ double largest_value(const cv::Mat& image) {
 
 cv::Mat stretched(const cv::Mat& image, int white, const std::string& name) {
   require_pixels(image, name);
-  if (white < 1) {
+  if (white < 1 || white > white_of_16_bits) {
     throw Error(name + " cannot be stretched from the white level " + std::to_string(white) +
                 "; give the largest value that its camera has, such as 4095.");
   }

@@ -166,7 +166,6 @@ class Matcher::Implementation {
       if (!hypotheses.empty()) backend_->set_hypotheses(view, hypotheses[i]);
     }
     backend_->run(schedule, progress);
-    holds_planes_ = true;
 
     StereoResult result;
     for (std::size_t i = 0; i < images.size(); ++i) {
@@ -175,6 +174,7 @@ class Matcher::Implementation {
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
     }
     require_overlap(result.views);
+    holds_planes_ = true;
     for (const Dispatch& dispatch : schedule.dispatches) result.samples += dispatch.samples;
     result.times = backend_->times();
     add_work(result.times, schedule);

@@ -131,6 +131,21 @@ TEST_P(WarmStarts, NeedPlanesThatFit) {
   start.hypotheses.assign(2, cv::Mat::zeros(3, 4, CV_32FC4));
   EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), start); }),
               HasSubstr("cam0 from is 4x3"));
+  // Deeper than an image.
+  const int sides[] = {size, size, 2};
+  start.hypotheses.assign(2, cv::Mat(3, sides, CV_32FC4, cv::Scalar::all(0)));
+  EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), start); }),
+              HasSubstr("cam0 from has 3 dimensions"));
+}
+
+TEST_P(WarmStarts, NeedAMatchOfViewsThatOverlap) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Rig rig = frame(0).rig;
+  rig.views[1].mask = cv::Mat::zeros(size, size, CV_8UC1);
+  Matcher matcher(*device, rig, options_of("fast"));
+  EXPECT_THAT(error_of([&] { matcher.match(images_of(frame(0))); }), HasSubstr("do not overlap"));
+  EXPECT_THAT(error_of([&] { matcher.match_next(images_of(frame(0)), {}); }),
+              HasSubstr("no planes of a previous frame"));
 }
 
 TEST_P(WarmStarts, ARefusedFrameChangesNothing) {

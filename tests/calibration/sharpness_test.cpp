@@ -72,6 +72,8 @@ TEST(Sharpness, BlursThatAreNoneAreRefused) {
     EXPECT_EQ(test::error_of([&] { blurred(scene(), blur); }).find("A blur of"), 0u) << blur;
   }
   EXPECT_EQ(test::error_of([] { blurred({}, 1); }).find("The image to blur is empty"), 0u);
+  EXPECT_EQ(test::error_of([] { blurred(cv::Mat(9, 9, CV_32SC1), 1); }).find("The image to blur"),
+            0u);
 }
 
 TEST(Sharpness, DifferenceIsTheBlurThatWasAdded) {

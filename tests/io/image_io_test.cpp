@@ -215,7 +215,7 @@ TEST(Images, OfFewerBitsAreStretched) {
   EXPECT_NE(error_of([] { stretched(cv::Mat(2, 2, CV_8UC1), 4095, "x"); }).find("16 bits"),
             std::string::npos);
   EXPECT_NE(error_of([] { stretched({}, 4095, "x"); }).find("x is empty"), std::string::npos);
-  for (const int white : {0, -1}) {
+  for (const int white : {0, -1, 65536}) {
     const cv::Mat black = cv::Mat::zeros(2, 2, CV_16UC1);
     EXPECT_NE(error_of([&] {
                 stretched(black, white, "x");
