@@ -3,11 +3,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <fstream>
 #include <iomanip>
 #include <opencv2/core.hpp>
 #include <sstream>
+#include <thread>
 
 #include "comma_locale.h"
 #include "error_of.h"
@@ -364,6 +367,16 @@ TEST_F(Trajectories, DoNotDependOnTheLocale) {
   const CommaNumbers numbers;
   if (!numbers.installed()) GTEST_SKIP() << "no locale with a decimal comma is installed";
   expect();
+}
+
+TEST_F(Trajectories, MayBeAPipe) {
+  const std::string pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::thread writer([&] { std::ofstream(pipe) << "1.5 0 0 2 0 0 0 1\n"; });
+  const std::string error = error_of(
+      [&] { EXPECT_EQ(read_trajectory(pipe).poses.at(0).world_from_body.translation().z(), 2); });
+  writer.join();
+  EXPECT_EQ(error, "");
 }
 
 TEST_F(Trajectories, BrokenLinesAreNamed) {
