@@ -108,6 +108,9 @@ void replace(ws::DevicePeaks& peaks, const ws::DevicePeaks& given) {
 
 void run_benchmark(BenchmarkArguments a) {
   require_one_device(a);
+  if (!a.output.empty() && a.output == a.plot) {
+    throw ws::Error("--output and --plot both name " + a.output + "; give each a file of its own.");
+  }
   for (const std::string& file : {a.output, a.plot}) {
     if (!file.empty()) ws::require_writable(file);
   }

@@ -19,9 +19,9 @@ struct ConvertArguments {
 };
 
 void convert(const ConvertArguments& arguments) {
-  const ws::Rig rig = ws::read_calibration(arguments.input).rig;
-  require_other_file(arguments.output.file, {arguments.input});
-  arguments.output.write(rig);
+  const ws::Calibration calibration = ws::read_calibration(arguments.input);
+  require_other_file(arguments.output.file, calibration.files);
+  arguments.output.write(calibration.rig);
   std::cout << "Wrote " << arguments.output.file << "\n";
 }
 

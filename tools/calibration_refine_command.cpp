@@ -134,7 +134,7 @@ ws::Rig with_limits_of(const ws::Rig& calibrated, ws::Rig rig) {
 
 void refine(const RefineArguments& arguments) {
   const cv::Size size = ws::read_image(arguments.images.front()).size();
-  const ws::Rig calibrated = ws::read_calibration(arguments.rig.calibration, size).rig;
+  const auto [calibrated, format, files] = ws::read_calibration(arguments.rig.calibration, size);
   ws::Rig rig = calibrated;
   arguments.rig.limit_fields_of_view(rig);
   const std::size_t count = rig.views.size();
@@ -144,8 +144,10 @@ void refine(const RefineArguments& arguments) {
                     " image(s); give one image of each camera, frame after frame, of two cameras "
                     "or more.");
   }
-  std::vector<std::string> read = arguments.images;
-  read.push_back(arguments.rig.calibration);
+  std::vector<std::filesystem::path> read = files;
+  for (const auto* more : {&arguments.images, &arguments.rig.masks}) {
+    read.insert(read.end(), more->begin(), more->end());
+  }
   require_other_file(arguments.output.file, read);
   ws::require_writable(arguments.output.file);
   arguments.output.require_form(rig);  // before the work of matching

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -51,9 +52,13 @@ const char* name_of(ws::CalibrationFormat format) {
   return "";
 }
 
-/// Full angle between the outermost usable rays of a line of pixels through the image centre.
+/// Full angle between the outermost usable rays of a line of pixels through the principal point, or
+/// through the pixel nearest to it where the image has been cut off before it.
 double field_of_view(const ws::Camera& camera, const Eigen::Vector2d& direction) {
-  const Eigen::Vector2d centre(camera.cx, camera.cy);
+  const Eigen::Vector2d centre(std::clamp(camera.cx, 0.0, camera.width - 1.0),
+                               std::clamp(camera.cy, 0.0, camera.height - 1.0));
+  Eigen::Vector3d axis;
+  if (!unproject(camera, centre, axis)) return 0;
   double angle = 0;
   for (const double sign : {-1.0, 1.0}) {
     double reached = 0;
@@ -63,7 +68,7 @@ double field_of_view(const ws::Camera& camera, const Eigen::Vector2d& direction)
       const bool inside = pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width - 1 &&
                           pixel.y() <= camera.height - 1;
       if (!inside || !unproject(camera, pixel, ray)) break;
-      reached = std::atan2(ray.head<2>().norm(), ray.z());
+      reached = std::atan2(axis.cross(ray).norm(), axis.dot(ray));
     }
     angle += reached;
   }
@@ -99,12 +104,13 @@ nlohmann::ordered_json describe(const ws::View& first, const ws::View& second) {
           {"direction_in_first", {direction.x(), direction.y(), direction.z()}}};
 }
 
-/// Where the IMU is in the frame of view 0.
-nlohmann::ordered_json describe_imu(const Eigen::Isometry3d& first_from_imu) {
+/// Where the IMU is in the frame of view 0, and what its clock is ahead of that view's images.
+nlohmann::ordered_json describe_imu(const Eigen::Isometry3d& first_from_imu, double time_offset) {
   const Eigen::Vector3d position = first_from_imu.translation();
   return {{"position_in_first_metres", {position.x(), position.y(), position.z()}},
           {"rotation_degrees",
-           Eigen::AngleAxisd(first_from_imu.linear()).angle() * ws::degrees_per_radian}};
+           Eigen::AngleAxisd(first_from_imu.linear()).angle() * ws::degrees_per_radian},
+          {"time_offset_seconds", time_offset}};
 }
 
 /// Most formats do not say where the lens ends.
@@ -124,7 +130,9 @@ void show(const ShowArguments& arguments) {
       json["pairs"].push_back(describe(views[i], views[j]));
     }
   }
-  if (const auto& imu = calibration.rig.world_from_imu) json["imu"] = describe_imu(*imu);
+  if (const auto& imu = calibration.rig.world_from_imu) {
+    json["imu"] = describe_imu(*imu, views.front().imu_time_offset);
+  }
   if (arguments.as_json) {
     std::cout << ws::to_text(json) << "\n";
     return;
@@ -153,9 +161,12 @@ void show(const ShowArguments& arguments) {
   }
   if (json.contains("imu")) {
     const auto& position = json["imu"]["position_in_first_metres"];
-    std::printf("  IMU in the frame of %s  %.4f %.4f %.4f m  rotation %.3f degrees\n",
-                views.front().name.c_str(), position[0].get<double>(), position[1].get<double>(),
-                position[2].get<double>(), json["imu"]["rotation_degrees"].get<double>());
+    std::printf(
+        "  IMU in the frame of %s  %.4f %.4f %.4f m  rotation %.3f degrees  clock ahead by %.6f "
+        "s\n",
+        views.front().name.c_str(), position[0].get<double>(), position[1].get<double>(),
+        position[2].get<double>(), json["imu"]["rotation_degrees"].get<double>(),
+        json["imu"]["time_offset_seconds"].get<double>());
   }
 }
 

@@ -71,6 +71,10 @@ int run(int argc, char** argv) {
     if (unknown.empty()) return report(app, error);
     say(unknown);
     return error.get_exit_code();
+  } catch (const CLI::ConversionError& error) {
+    // Words have been found to be numbers: just their range is left.
+    say(std::string(error.what()) + "; it is too large, or negative where it may not be.");
+    return error.get_exit_code();
   } catch (const CLI::ParseError& error) {
     return report(app, error);
   } catch (const widestereo::Error& error) {

@@ -2,7 +2,6 @@
 #include "option_checks.h"
 
 #include <algorithm>
-#include <filesystem>
 
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -54,11 +53,13 @@ CLI::Validator non_negative_number() {
       "NONNEGATIVE");
 }
 
-void require_other_file(const std::string& output, const std::vector<std::string>& inputs) {
-  for (const std::string& input : inputs) {
+void require_other_file(const std::filesystem::path& output,
+                        const std::vector<std::filesystem::path>& inputs) {
+  for (const std::filesystem::path& input : inputs) {
     std::error_code missing;
     if (!std::filesystem::equivalent(input, output, missing)) continue;
-    throw ws::Error(output + " is among the files that are read; choose another file to write.");
+    throw ws::Error(output.string() +
+                    " is among the files that are read; choose another file to write.");
   }
 }
 

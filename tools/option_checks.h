@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,7 +32,8 @@ CLI::Validator name_among(const std::vector<std::pair<std::string, Value>>& name
 }
 
 /// Throws Error where a file to be written is one of those that are read.
-void require_other_file(const std::string& output, const std::vector<std::string>& inputs);
+void require_other_file(const std::filesystem::path& output,
+                        const std::vector<std::filesystem::path>& inputs);
 
 /// Makes every option, of subcommands too, refuse an empty word, and where it takes numbers NaN and
 /// infinity, and read whole numbers by their decimal digits.

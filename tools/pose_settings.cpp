@@ -49,6 +49,13 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
                       "(Basalt), or give --poses-of camera if they are of camera 0.");
     }
     trajectory.poses = ws::poses_of_camera(std::move(trajectory.poses), *rig.world_from_imu);
+    const double ahead = rig.views.front().imu_time_offset;
+    for (ws::StampedPose& pose : trajectory.poses) pose.seconds -= ahead;
+    if (ahead != 0) {
+      say(ws::formatted(
+          "The IMU's poses are those at the times of the images plus %.6f s, as %s says.", ahead,
+          calibration.c_str()));
+    }
   }
   read.poses = ws::poses_of_frames(frames, chosen, std::move(trajectory.poses), tolerance, file);
   return read;

@@ -56,7 +56,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
 
 PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   PosedImages posed = ws::is_sfm_model(rig.calibration) ? of_model() : of_trajectory();
-  apply_masks(posed);
+  const std::vector<bool> masked = apply_masks(posed);
   posed.size = size;
   posed.white_level = white_level;
   // One mask of many images stays one in memory.
@@ -67,7 +67,7 @@ PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
     if (mask.empty()) mask = reduced.mask;
     reduced.mask = mask;
   }
-  if (masks.empty()) leave_out_dark_rims(posed);
+  leave_out_dark_rims(posed, masked);
   if (posed.selection == nullptr) {
     const ws::CalibratedImages without_points{.rig = {}, .in_metres = posed.in_metres};
     const ws::Options options = with_range(settings, without_points, rig.calibration).options();
@@ -164,36 +164,40 @@ PosedImages PosedImageSettings::of_trajectory() const {
   return posed;
 }
 
-void PosedImageSettings::apply_masks(PosedImages& posed) const {
-  if (masks.empty()) return;
+std::vector<bool> PosedImageSettings::apply_masks(PosedImages& posed) const {
+  std::vector<bool> masked(posed.calibrated.size());
+  if (masks.empty()) return masked;
   if (!fs::is_directory(masks)) {
     throw ws::Error(masks + " is no folder; give the one that holds NAME.png for the image NAME.");
   }
   const auto mask_of = [this](const ws::View& view) {
     return fs::path(masks) / (view.name + ".png");
   };
-  bool found = false;
-  for (ws::View& view : posed.calibrated) {
+  for (std::size_t i = 0; i < posed.calibrated.size(); ++i) {
+    ws::View& view = posed.calibrated[i];
     const fs::path mask = mask_of(view);
     if (!fs::exists(mask)) continue;
-    found = true;
+    masked[i] = true;
     view.mask = ws::read_mask(mask);
     ws::require_calibrated_size(view.mask, view, mask.string());
   }
+  const bool found = std::find(masked.begin(), masked.end(), true) != masked.end();
   if (!found && !posed.calibrated.empty()) {
     throw ws::Error(masks + " holds no mask of any image; there should be " +
                     mask_of(posed.calibrated.front()).string() + ", for example.");
   }
+  return masked;
 }
 
-void PosedImageSettings::leave_out_dark_rims(PosedImages& posed) const {
-  std::vector<bool> done(posed.views.size());
+void PosedImageSettings::leave_out_dark_rims(PosedImages& posed,
+                                             const std::vector<bool>& masked) const {
+  std::vector<bool> done = masked;
   for (std::size_t first = 0; first < posed.views.size(); ++first) {
     if (done[first]) continue;
     const ws::Camera camera = posed.views[first].camera;
     Images of_camera;
     for (std::size_t i = first; i < posed.views.size(); ++i) {
-      if (posed.views[i].camera == camera) of_camera.push_back(i);
+      if (!masked[i] && posed.views[i].camera == camera) of_camera.push_back(i);
     }
     ws::Rig sample;
     std::vector<cv::Mat> seen;

@@ -60,6 +60,8 @@ struct PosedImageSettings {
  private:
   PosedImages of_model() const;
   PosedImages of_trajectory() const;
-  void apply_masks(PosedImages& images) const;
-  void leave_out_dark_rims(PosedImages& images) const;
+  /// Which images have a mask of their own.
+  std::vector<bool> apply_masks(PosedImages& images) const;
+  /// Of those that have none.
+  void leave_out_dark_rims(PosedImages& images, const std::vector<bool>& masked) const;
 };

@@ -94,7 +94,10 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     ws::View& view = rig.views[i];
     if (max_theta > 0) view.camera.max_theta = max_theta * ws::radians_per_degree;
-    if (!read.empty()) view.mask = read[read.size() == 1 ? 0 : i];
+    if (read.empty()) continue;
+    const std::size_t mask = read.size() == 1 ? 0 : i;
+    view.mask = read[mask];
+    ws::require_calibrated_size(view.mask, view, masks[mask]);
   }
 }
 

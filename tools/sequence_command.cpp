@@ -158,6 +158,7 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"options", Json::parse(ws::to_json(options))}};
   if (selection.motion.of == PoseSettings::imu) {
     settings["world_from_imu"] = to_json(*selection.rig.world_from_imu);
+    settings["imu_time_offset"] = selection.rig.views.front().imu_time_offset;
   }
   for (const ws::View& view : selection.rig.views) settings["views"].push_back(to_json(view));
   return settings;

@@ -31,7 +31,10 @@ struct SynthesisArguments {
 
 void run_synthesis(const SynthesisArguments& a) {
   if (!a.picture.empty()) {
-    require_other_file(a.picture, {a.distance, a.image, a.other, a.rig.calibration});
+    std::vector<std::filesystem::path> read = {a.distance, a.image, a.other, a.rig.calibration,
+                                               a.poses.file};
+    read.insert(read.end(), a.rig.masks.begin(), a.rig.masks.end());
+    require_other_file(a.picture, read);
   }
   cv::Mat image = ws::to_grey_levels(a.white_level.read(a.image), a.image);
   cv::Mat other = ws::to_grey_levels(a.white_level.read(a.other), a.other);

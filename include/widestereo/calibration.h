@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "widestereo/rig.h"
 
@@ -28,6 +29,7 @@ struct Calibration {
   Rig rig;  ///< view 0's camera frame is the world frame; the IMU as in T_cam_imu, T_imu_cam, T_BS,
             ///< body_T_cam0, IMU.T_b_c1, imuExtrinsics
   CalibrationFormat format = CalibrationFormat::kalibr;
+  std::vector<std::filesystem::path> files;  ///< that it was read from, those named in one, too
 };
 
 /// Reads a Kalibr camchain YAML, a Basalt JSON, an OpenCV FileStorage (YAML, XML or JSON; fisheye
@@ -40,16 +42,17 @@ struct Calibration {
 /// the file, the key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
-/// A Kalibr camchain (with T_cam_imu where the IMU is known, and the extra key max_theta_deg where
-/// the field of view is limited), for a file that errors name. Throws Error for a rig that
-/// validate() refuses, and where a camera has no Kalibr form (skew, k3, ...).
+/// A Kalibr camchain (with T_cam_imu where the IMU is known, timeshift_cam_imu where its clock is
+/// another one, and the extra key max_theta_deg where the field of view is limited), for a file
+/// that errors name. Throws Error for a rig that validate() refuses, and where a camera has no
+/// Kalibr form (skew, k3, ...).
 std::string kalibr_text(const std::filesystem::path& path, const Rig& rig);
 /// Writes it. Throws Error where the file cannot be written, too.
 void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
 /// A Basalt JSON, for a file that errors name; T_imu_cam of view 0 is the identity where no IMU is
 /// known, and the IMU's rate, biases and noise are Basalt's defaults. Throws Error for a rig that
-/// validate() refuses, and where a camera has no Basalt form.
+/// validate() refuses, where a camera has no Basalt form, and where cameras' times differ.
 std::string basalt_text(const std::filesystem::path& path, const Rig& rig);
 /// Writes it. Throws Error where the file cannot be written, too.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);

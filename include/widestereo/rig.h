@@ -18,6 +18,9 @@ struct View {
   Camera camera;
   Eigen::Isometry3d world_from_camera = Eigen::Isometry3d::Identity();  ///< metres
   cv::Mat mask;  ///< empty, or CV_8UC1 of the camera's size, 0 = excluded
+  /// Seconds to add to the times of its images for those of the IMU's clock (timeshift_cam_imu of
+  /// Kalibr, cam_time_offset_ns of Basalt, td of VINS-Fusion).
+  double imu_time_offset = 0;
 };
 
 /// Calibrated cameras with poses in a common frame (view 0's camera frame when read from a

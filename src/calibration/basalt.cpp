@@ -21,6 +21,9 @@ using Json = nlohmann::ordered_json;
 /// Extra key of ours: half angles of the fields of view in degrees, one for each camera.
 constexpr const char* max_theta_key = "max_theta_deg";
 
+constexpr const char* time_offset_key = "cam_time_offset_ns";
+constexpr double nanoseconds_per_second = 1e9;
+
 /// As headsets of Windows Mixed Reality have it.
 constexpr const char* radtan8 = "pinhole-radtan8";
 constexpr std::pair<const char*, double Camera::*> radtan8_coefficients[] = {
@@ -39,7 +42,6 @@ void add_defaults(Json& value) {
   value["gyro_noise_std"] = three(0.000282);
   value["accel_bias_std"] = three(0.001);
   value["gyro_bias_std"] = three(0.0001);
-  value["cam_time_offset_ns"] = 0;
   value["vignette"] = Json::array();
 }
 
@@ -171,6 +173,20 @@ Json basalt_form(const View& view, const std::filesystem::path& path) {
   return {{"camera_type", type}, {"intrinsics", values}};
 }
 
+/// Basalt has one for all cameras, each of which Kalibr estimates by itself.
+long long time_offset_form(const Rig& rig, const std::filesystem::path& path) {
+  constexpr double same = 1e-3;  // seconds
+  const double offset = rig.views.front().imu_time_offset;
+  for (const View& view : rig.views) {
+    if (std::abs(view.imu_time_offset - offset) <= same) continue;
+    throw Error("Cannot write " + path.string() + ": the IMU's clock is ahead of " +
+                rig.views.front().name + " and " + view.name +
+                " by times that differ by more than a millisecond, which Basalt's format cannot "
+                "hold; Kalibr's does.");
+  }
+  return std::llround(offset * nanoseconds_per_second);
+}
+
 }  // namespace
 
 Rig read_basalt(const Document& document) {
@@ -207,6 +223,10 @@ Rig read_basalt(const Document& document) {
         }
         view.camera.max_theta = limits[i].get<double>() * radians_per_degree;
       }
+    }
+    if (value.contains(time_offset_key)) {
+      const double offset = number(document, value, time_offset_key) / nanoseconds_per_second;
+      for (View& view : rig.views) view.imu_time_offset = offset;
     }
     const Eigen::Isometry3d first_from_imu = rig.views.front().world_from_camera.inverse();
     for (View& view : rig.views) view.world_from_camera = first_from_imu * view.world_from_camera;
@@ -253,6 +273,7 @@ std::string basalt_text(const std::filesystem::path& path, const Rig& rig) {
     limited = limited || view.camera.max_theta < std::numbers::pi;
   }
   calibration::add_defaults(value);
+  value[calibration::time_offset_key] = calibration::time_offset_form(rig, path);
   if (limited) value[calibration::max_theta_key] = limits;
   return Json{{"value0", value}}.dump(2) + "\n";
 }

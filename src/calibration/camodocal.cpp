@@ -119,7 +119,11 @@ Rig read_vins(const Document& document,
       document.fail("The key num_of_cam says " + stated + ", but cam0_calib and the next name " +
                     found + "; correct one.");
     }
-    if (keys.text("imu", "1") == "0") rig.world_from_imu.reset();
+    if (keys.text("imu", "1") == "0") {
+      rig.world_from_imu.reset();
+    } else if (keys.has("td")) {
+      for (View& view : rig.views) view.imu_time_offset = keys.number("td");
+    }
   });
   return rig;
 }

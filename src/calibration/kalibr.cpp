@@ -17,6 +17,8 @@ namespace widestereo {
 namespace calibration {
 namespace {
 
+constexpr const char* time_offset_key = "timeshift_cam_imu";
+
 /// Where the IMU is, by Kalibr's key or by OpenVINS's; none where the camera has neither.
 std::optional<Eigen::Isometry3d> camera_from_imu(const YamlCamera& camera) {
   if (camera.has("T_cam_imu")) return camera.motion("T_cam_imu");
@@ -55,6 +57,7 @@ Rig read_kalibr(const Document& document) {
         view.world_from_camera =
             rig.views.back().world_from_camera * camera.motion("T_cn_cnm1").inverse();
       }
+      if (camera.has(time_offset_key)) view.imu_time_offset = camera.number(time_offset_key);
       if (from_imu && !rig.world_from_imu) rig.world_from_imu = view.world_from_camera * *from_imu;
       rig.views.push_back(view);
     }
@@ -83,13 +86,8 @@ std::vector<std::string> texts_of(const std::vector<T>& numbers) {
   return texts;
 }
 
-KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
-  const Camera& c = view.camera;
-  if (c.skew != 0 ||
-      ((c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei) && c.k3 != 0)) {
-    throw Error("Cannot write " + path.string() + ": " + view.name +
-                " has a skew or a k3, which Kalibr's format cannot hold.");
-  }
+/// None where Kalibr lacks the model.
+std::optional<KalibrForm> form_of(const Camera& c) {
   const std::vector<double> f = {c.fx, c.fy, c.cx, c.cy};
   const auto with = [&f](std::vector<double> first) {
     first.insert(first.end(), f.begin(), f.end());
@@ -98,32 +96,47 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
   const std::vector<double> radtan = {c.k1, c.k2, c.p1, c.p2};
   switch (c.model) {
     case CameraModel::pinhole:
-      return {"pinhole", f, "none", {}};
+      return KalibrForm{"pinhole", f, "none", {}};
     case CameraModel::pinhole_radtan:
-      return {"pinhole", f, "radtan", radtan};
+      return KalibrForm{"pinhole", f, "radtan", radtan};
     case CameraModel::kannala_brandt:
-      return {"pinhole", f, "equidistant", {c.k1, c.k2, c.k3, c.k4}};
+      return KalibrForm{"pinhole", f, "equidistant", {c.k1, c.k2, c.k3, c.k4}};
     case CameraModel::double_sphere:
-      return {"ds", with({c.xi, c.alpha}), "none", {}};
+      return KalibrForm{"ds", with({c.xi, c.alpha}), "none", {}};
     case CameraModel::unified:
-      return {"omni", with({c.xi}), "none", {}};
+      return KalibrForm{"omni", with({c.xi}), "none", {}};
     case CameraModel::extended_unified:
-      return {"eucm", with({c.alpha, c.beta}), "none", {}};
+      return KalibrForm{"eucm", with({c.alpha, c.beta}), "none", {}};
     case CameraModel::field_of_view:
-      return {"pinhole", f, "fov", {c.omega}};
+      return KalibrForm{"pinhole", f, "fov", {c.omega}};
     case CameraModel::mei:
-      return {"omni", with({c.xi}), "radtan", radtan};
+      return KalibrForm{"omni", with({c.xi}), "radtan", radtan};
     case CameraModel::equirectangular:
-      return {"equirectangular", f, "none", {}};
+      return KalibrForm{"equirectangular", f, "none", {}};
     case CameraModel::pinhole_rational:
     case CameraModel::thin_prism_fisheye:
     case CameraModel::rad_tan_thin_prism_fisheye:
     case CameraModel::polynomial_fisheye:
       break;
   }
-  throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
-              ") has no form in Kalibr's format; Basalt's holds pinhole_rational cameras without "
-              "prisms.");
+  return std::nullopt;
+}
+
+KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
+  const Camera& c = view.camera;
+  const std::optional<KalibrForm> form = form_of(c);
+  if (!form) {
+    throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
+                ") has no form in Kalibr's format; Basalt's holds pinhole_rational cameras without "
+                "prisms.");
+  }
+  const bool third_of_radtan =
+      c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei;
+  if (c.skew != 0 || (third_of_radtan && c.k3 != 0)) {
+    throw Error("Cannot write " + path.string() + ": " + view.name +
+                " has a skew or a k3, which Kalibr's format cannot hold.");
+  }
+  return *form;
 }
 
 }  // namespace
@@ -159,6 +172,10 @@ std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
     };
     if (rig.world_from_imu) {
       motion("T_cam_imu", (view.world_from_camera.inverse() * *rig.world_from_imu).matrix());
+    }
+    if (view.imu_time_offset != 0) {
+      out << YAML::Key << calibration::time_offset_key << YAML::Value
+          << text_of(view.imu_time_offset);
     }
     if (i > 0) motion("T_cn_cnm1", source_from_reference(view, rig.views[i - 1]).matrix());
     out << YAML::EndMap;

@@ -186,9 +186,13 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
   using namespace calibration;
   Calibration result;
   const std::vector<std::filesystem::path> sensor_files = euroc_files(path);
+  const auto load_noted = [&result](const std::filesystem::path& file) {
+    result.files.push_back(file);
+    return load(file);
+  };
   std::vector<Document> documents;
-  if (sensor_files.empty()) documents.push_back(load(path));
-  for (const std::filesystem::path& file : sensor_files) documents.push_back(load(file));
+  if (sensor_files.empty()) documents.push_back(load_noted(path));
+  for (const std::filesystem::path& file : sensor_files) documents.push_back(load_noted(file));
   result.format = sensor_files.empty() ? format_of(documents[0]) : CalibrationFormat::euroc;
   switch (result.format) {
     case CalibrationFormat::kalibr:
@@ -207,7 +211,7 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       result.rig = read_camodocal(documents[0]);
       break;
     case CalibrationFormat::vins:
-      result.rig = read_vins(documents[0], load);
+      result.rig = read_vins(documents[0], load_noted);
       break;
     case CalibrationFormat::ocam:
       result.rig = read_ocam(documents[0]);
@@ -216,7 +220,7 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       result.rig = read_omnimvs(documents[0]);
       break;
     case CalibrationFormat::multicol:
-      result.rig = read_multicol(documents[0], load);
+      result.rig = read_multicol(documents[0], load_noted);
       break;
     case CalibrationFormat::woodscape:
       result.rig = read_woodscape(documents[0]);

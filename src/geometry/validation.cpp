@@ -16,6 +16,8 @@
 namespace widestereo {
 namespace {
 
+constexpr double longest_time_offset = 3600;  // seconds
+
 void require(bool good, const std::string& name, const std::string& what, double value,
              const std::string& remedy) {
   if (good) return;
@@ -166,6 +168,10 @@ void require_valid(const View& view, const std::string& name) {
   validate(view.camera, of_view);
   require_rigid(view.world_from_camera, of_view);
   require_fitting_mask(view.mask, view.camera, of_view);
+  if (!(std::abs(view.imu_time_offset) <= longest_time_offset)) {
+    throw Error(of_view + ": the IMU's clock is ahead by " + text_of(view.imu_time_offset) +
+                " s; give less than an hour, in seconds.");
+  }
 }
 
 void validate(const Rig& rig, const std::string& name) {

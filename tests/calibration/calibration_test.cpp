@@ -210,6 +210,28 @@ TEST(Kalibr, CommentsMayNameOtherFormats) {
   }
 }
 
+TEST(Kalibr, ReadsTheTimesOfTheImu) {
+  const TemporaryFolder folder;
+  std::string text = replaced(kalibr_text, "cam1:\n", "cam1:\n  timeshift_cam_imu: -0.0302\n");
+  const Rig rig = read_calibration(folder.write("chain.yaml", text)).rig;
+  EXPECT_EQ(rig.views[0].imu_time_offset, 0);
+  EXPECT_EQ(rig.views[1].imu_time_offset, -0.0302);
+  write_kalibr(folder / "again.yaml", rig);
+  EXPECT_EQ(read_calibration(folder / "again.yaml").rig.views[1].imu_time_offset, -0.0302);
+  EXPECT_NE(test::error_of([&] {
+              write_basalt(folder / "one.json", rig);
+            }).find("cam0 and cam1 by times that differ by more than a millisecond"),
+            std::string::npos);
+  for (const char* wrong : {"4000", ".nan", "soon"}) {
+    text = replaced(kalibr_text, "cam1:\n",
+                    std::string("cam1:\n  timeshift_cam_imu: ") + wrong + "\n");
+    EXPECT_NE(
+        test::error_of([&] { read_calibration(folder.write("chain.yaml", text)); }).find("cam1"),
+        std::string::npos)
+        << wrong;
+  }
+}
+
 TEST(Kalibr, ReadsWhereTheImuIs) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& text) {
@@ -612,10 +634,14 @@ TEST(Writing, RoundTripsExactly) {
           (rig.views[i].world_from_camera.matrix() - again.views[i].world_from_camera.matrix())
               .norm(),
           1e-9);
+      EXPECT_DOUBLE_EQ(again.views[i].imu_time_offset, rig.views[i].imu_time_offset);
     }
   };
   for (const bool with_imu : {false, true}) {
-    if (with_imu) rig.world_from_imu = camera_beside_imu();
+    if (with_imu) {
+      rig.world_from_imu = camera_beside_imu();
+      for (View& view : rig.views) view.imu_time_offset = -0.016604847;
+    }
     write_kalibr(folder / "again.yaml", rig);
     same(read_calibration(folder / "again.yaml").rig);
     write_basalt(folder / "again.json", rig);
@@ -669,6 +695,15 @@ TEST_P(WritingCameras, AsKalibrDoes) {
   const bool is_radtan = c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei;
   expect_held(!has_no_form.contains(c.model) && c.skew == 0 && !(is_radtan && c.k3 != 0),
               write_kalibr);
+}
+
+TEST(Writing, NamesAModelThatKalibrLacksBeforeItsSkew) {
+  const TemporaryFolder folder;
+  Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  rig.views[0].camera.model = CameraModel::thin_prism_fisheye;
+  rig.views[0].camera.skew = 0.1;
+  const std::string error = test::error_of([&] { write_kalibr(folder / "again.yaml", rig); });
+  EXPECT_NE(error.find("cam0 (thin_prism_fisheye) has no form"), std::string::npos) << error;
 }
 
 TEST_P(WritingCameras, AsBasaltDoes) {

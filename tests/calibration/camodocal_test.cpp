@@ -189,6 +189,12 @@ TEST_F(Vins, ReadsTheRig) {
   ASSERT_TRUE(rig.world_from_imu.has_value());
   EXPECT_LT((rig.world_from_imu->translation() - Eigen::Vector3d(0.2, 0.3, -0.1)).norm(), 1e-12);
   EXPECT_FALSE(read(vins("imu: 0\n")).rig.world_from_imu.has_value());
+  EXPECT_EQ(rig.views[1].imu_time_offset, 0);
+  EXPECT_EQ(read(vins("td: 0.0125\n")).rig.views[1].imu_time_offset, 0.0125);
+  EXPECT_EQ(read(vins("imu: 0\ntd: 0.0125\n")).rig.views[1].imu_time_offset, 0);
+  const std::vector<std::filesystem::path> files = {
+      folder_ / "config.yaml", folder_ / "cam0_mei.yaml", folder_ / "lenses/cam1.yaml"};
+  EXPECT_EQ(calibration.files, files);
 }
 
 TEST_F(Vins, WhatIsWrongIsOneSentence) {

@@ -64,6 +64,19 @@ TEST(LensRim, IsWhereASharpCircleEnds) {
   }
 }
 
+TEST(LensRim, IsFoundInSmallImages) {
+  for (const int size : {96, 128, 160}) {
+    Camera camera = fisheye();
+    const double scale = size / static_cast<double>(camera.width);
+    camera.width = camera.height = size;
+    for (double* scaled : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *scaled *= scale;
+    const auto rim =
+        find_lens_rim(camera, {photograph(camera, [](double t) { return up_to(t, 97.5); })});
+    ASSERT_TRUE(rim) << size;
+    EXPECT_NEAR(rim->usable / degree, 97.5, 1.1) << size;
+  }
+}
+
 TEST(LensRim, LeavesReflectionsOut) {
   // Light falls from 88 to 94 degrees; half a lens's rim glows up to 97.
   cv::Mat image =

@@ -208,7 +208,7 @@ TEST_F(Command, BadImagesAreNamed) {
   expect_error(depth_of("calib.yaml", "right.png"), "calib.yaml");
   expect_error("depth " + file("") + " -c " + file("calib.yaml") + " -o " + file("out"),
                "is a folder; give images");
-  expect_error(depth_of("left.png", "right.png") + "--mask " + file("small.png"), "mask");
+  expect_error(depth_of("left.png", "right.png") + "--mask " + file("small.png"), "small.png");
   expect_error(depth_of("left.png", "right.png") + "--mask " + file("no.png"), "no.png");
   expect_error(depth_of("left.png", "right.png") + "--mask a.png,b.png,c.png",
                "--mask names 3 images for 2 views");
@@ -282,6 +282,9 @@ TEST_F(RefusedWords, WholeNumbersAreDecimalDigits) {
   expect_refusal(sequence() + "--views 0,0x1", "--views: 0x1 is no whole number");
   expect_refusal(sequence() + "--seed 0b1", "--seed: 0b1 is no whole number");
   expect_refusal(sequence() + "--step 000", "--step: 0 is no number above 0");
+  for (const char* words : {"--seed -1", "--levels 99999999999", "--views 0,99999999999"}) {
+    expect_refusal(sequence() + words, "; it is too large, or negative where it may not be.");
+  }
   const Outcome outcome =
       run("demo --size 00064 --seed +010 --preset fast --device cpu --json --no-pictures -o " +
           file("decimal"));
@@ -655,7 +658,7 @@ cam1:
   - [0.0, 0.0, 1.0, 0.0]
   - [0.0, 0.0, 0.0, 1.0]
   camera_model: pinhole
-  intrinsics: [50.0, 50.0, 150.0, 50.0]
+  intrinsics: [50.0, 50.0, 150.0, -20.0]
   distortion_model: none
   distortion_coeffs: []
   resolution: [301, 101]
@@ -668,6 +671,11 @@ cam1:
   EXPECT_NEAR(view["horizontal_field_of_view_degrees"], degrees(150 / 50.), 1e-6);
   EXPECT_NEAR(view["vertical_field_of_view_degrees"], degrees(50 / 50.), 1e-6);
   EXPECT_NEAR(view["diagonal_field_of_view_degrees"], degrees(std::hypot(150, 50) / 50), 0.5);
+  // Of a sensor that was cut off below the principal point.
+  const nlohmann::json& cut = shown["views"][1];
+  EXPECT_NEAR(cut["vertical_field_of_view_degrees"],
+              (std::atan(120 / 50.) - std::atan(20 / 50.)) * 180 / M_PI, 1e-6);
+  EXPECT_GT(cut["horizontal_field_of_view_degrees"], 90);
   const nlohmann::json& pair = shown["pairs"][0];
   EXPECT_NEAR(pair["baseline_metres"], 0.1, 1e-12);
   EXPECT_NEAR(pair["rotation_degrees"], 90, 1e-9);

@@ -15,6 +15,18 @@
 namespace widestereo::test {
 namespace {
 
+constexpr const char* euroc_sensor = R"(sensor_type: camera
+T_BS:
+  cols: 4
+  rows: 4
+  data: [0.0, 0.0, 1.0, 0.1, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+resolution: [752, 480]
+camera_model: pinhole
+intrinsics: [458.5, 457.25, 367.0, 248.0]
+distortion_model: radial-tangential
+distortion_coefficients: [-0.28, 0.07, 0.0, 0.0]
+)";
+
 class Output : public Command {
  protected:
   std::set<std::string> files_in(const std::string& folder) const {
@@ -111,6 +123,17 @@ TEST_F(Output, DoesNotReplaceTheCalibrationThatIsRead) {
         error);
   }
   EXPECT_EQ(bytes_of("calib.yaml"), before);
+  // Files that the one given names, and masks.
+  fs::create_directories(folder_ / "euroc/cam0");
+  folder_.write("euroc/cam0/sensor.yaml", euroc_sensor);
+  const std::string sensor = file("euroc/cam0/sensor.yaml");
+  expect_error("calibration convert " + file("euroc") + " " + sensor + " --to kalibr",
+               sensor + " is among the files that are read;");
+  EXPECT_EQ(bytes_of("euroc/cam0/sensor.yaml"), euroc_sensor);
+  cv::imwrite(file("mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  expect_error("calibration refine " + images + " -c " + file("calib.yaml") + " --mask " +
+                   file("mask.png") + " --to kalibr -o " + file("mask.png"),
+               "mask.png is among the files that are read;");
 }
 
 TEST_F(Output, PicturesDoNotReplaceWhatIsRead) {
@@ -124,6 +147,19 @@ TEST_F(Output, PicturesDoNotReplaceWhatIsRead) {
   expect_refused("view-synthesis " + file("distance.tiff") + " " + file("left.png") + " " +
                      file("right.png") + calibration + " --picture ",
                  "right.png");
+  cv::imwrite(file("mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  expect_refused("view-synthesis " + file("distance.tiff") + " " + file("left.png") + " " +
+                     file("right.png") + calibration + " --mask " + file("mask.png") +
+                     " --picture ",
+                 "mask.png");
+  folder_.write("poses.png", "0 0 0 0 0 0 0 1\n");
+  expect_refused("view-synthesis " + file("distance.tiff") + " " + file("left.png") + " " +
+                     file("right.png") + calibration + " --poses " + file("poses.png") +
+                     " --picture ",
+                 "poses.png");
+  expect_error(
+      "benchmark --devices cpu --sizes 64 -o " + file("b.svg") + " --plot " + file("b.svg"),
+      "--output and --plot both name");
   for (const char* output : {"distance.tiff", "left.png"}) {
     expect_refused("evaluate " + file("distance.tiff") + calibration + " --truth " +
                        file("distance.tiff") + " --image " + file("left.png") + " --error-map ",

@@ -7,10 +7,12 @@
 #include <Eigen/Geometry>
 #include <iomanip>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
 #include "command_fixture.h"
+#include "replaced.h"
 #include "widestereo/calibration.h"
 #include "widestereo/image_io.h"
 #include "widestereo/synthesis.h"
@@ -531,6 +533,25 @@ TEST_F(SequenceOfTheDemo, KnownMotionLeadsFromTheFrameBefore) {
   EXPECT_GT(wrong_after(world_from_rig(1).inverse()), 2 * right) << "the way back";
 }
 
+TEST_F(SequenceOfTheDemo, ImagesWithoutAMaskEndWhereTheyTurnBlack) {
+  Rig rig = frames_[0].rig;
+  for (View& view : rig.views) view.camera.max_theta = std::numbers::pi;
+  write_kalibr(file("whole.yaml"), rig);
+  fs::create_directories(folder_ / "masks/000");
+  write_image(folder_ / "masks/000/cam0.png", cv::Mat(size, size, CV_8UC1, cv::Scalar(255)));
+  const std::string reconstruct =
+      "reconstruct " + file("data") + " -c " + file("whole.yaml") +
+      " --count 1 --device cpu --preset fast --min-distance 0.4 --max-distance 8 -o ";
+  const auto expect_rims = [](const Outcome& outcome, bool of_first) {
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_EQ(outcome.output.find("000/cam0 is black from") != std::string::npos, of_first)
+        << outcome.output;
+    EXPECT_NE(outcome.output.find("000/cam1 is black from"), std::string::npos) << outcome.output;
+  };
+  expect_rims(run(reconstruct + file("all")), true);
+  expect_rims(run(reconstruct + file("some") + " --masks " + file("masks")), false);
+}
+
 TEST_F(SequencePoses, OfTheImuAreThoseOfTheCamera) {
   for (const std::string options : {"", "--views 1,0 "}) {
     const Outcome camera = run(with("camera.txt", "camera") + "--overwrite " + options);
@@ -547,6 +568,42 @@ TEST_F(SequencePoses, OfTheImuAreThoseOfTheCamera) {
   EXPECT_NE(bytes_of(folder_ / "wrong/002/distance0.tiff"),
             bytes_of(folder_ / "imu/002/distance0.tiff"))
       << "the motion matters here";
+}
+
+TEST_F(SequencePoses, OfAnImuAreByItsOwnClock) {
+  for (int k = 0; k < 3; ++k) {
+    for (const std::string camera : {"/cam0/", "/cam1/"}) {
+      fs::create_directories(folder_ / ("timed" + camera));
+      fs::copy_file(folder_ / ("data" + camera + "00" + std::to_string(k) + ".png"),
+                    folder_ / ("timed" + camera + "170000000" + std::to_string(k) + ".png"));
+    }
+  }
+  const auto poses_after = [this](const std::string& name, const std::string& nanoseconds) {
+    std::string text = "\n" + bytes_of(folder_ / "imu.csv");
+    for (const std::string k : {"0", "1", "2"}) {
+      text = replaced(text, "\n" + k + "000000000,", "\n170000000" + k + nanoseconds + ",");
+    }
+    folder_.write(name, text.substr(1));
+  };
+  poses_after("same.csv", "000000000");
+  poses_after("ahead.csv", "250000000");
+  folder_.write("ahead.yaml", replaced(bytes_of(folder_ / "imucam.yaml"), "cam0:\n",
+                                       "cam0:\n  timeshift_cam_imu: 0.25\n"));
+  const auto match = [this](const std::string& poses, const std::string& output,
+                            const std::string& calibration) {
+    return run(replaced(with(poses, output, calibration), file("data"), file("timed")));
+  };
+  const Outcome same = match("same.csv", "same", "imucam.yaml");
+  ASSERT_EQ(same.exit_code, 0) << same.output;
+  EXPECT_NE(match("ahead.csv", "out", "imucam.yaml").exit_code, 0) << "no pose is near in time";
+  const Outcome ahead = match("ahead.csv", "ahead", "ahead.yaml");
+  ASSERT_EQ(ahead.exit_code, 0) << ahead.output;
+  EXPECT_NE(ahead.output.find("at the times of the images plus 0.250000 s"), std::string::npos)
+      << ahead.output;
+  for (const std::string map : {"1700000001/distance0.tiff", "1700000002/distance1.tiff"}) {
+    EXPECT_TRUE(bytes_of(folder_ / ("same/" + map)) == bytes_of(folder_ / ("ahead/" + map)));
+  }
+  EXPECT_EQ(record("ahead")["settings"]["imu_time_offset"], 0.25);
 }
 
 TEST_F(SequencePoses, FramesWithOtherPosesAreMatchedAgain) {
