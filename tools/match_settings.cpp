@@ -151,7 +151,7 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
   add_pyramid("--step-normal", &Options::step_normal,
               "First perturbation of a unit normal, at the coarsest level");
   add_pyramid("--source-planes", &Options::source_planes,
-              "Try the source views' own planes: true or false");
+              "Try the source views' own planes in the last iteration: true or false");
   add_pyramid("--coarse-planes", &Options::coarse_planes,
               "Planes of coarser pixels that a finer one starts from the best of, 1 to 4");
   add_pyramid("--alternate-strips", &Options::alternate_strips,

@@ -123,7 +123,7 @@ struct Options {
   double step_pixels = 1;     ///< first perturbation, source pixels, 0..1000; halved each iteration
   double step_normal = 0.5;   ///< first perturbation of a unit normal, at the coarsest level only,
                               ///< 0..2; halved each iteration
-  bool source_planes = true;  ///< try the planes that the source views hold
+  bool source_planes = true;  ///< try the source views' planes in the last iteration
   /// Coarser pixels around a finer one whose planes it starts from, the best of them, 1..4.
   int coarse_planes = 4;
   /// On all levels but the coarsest, iterations try the planes of far pixels and of near ones by

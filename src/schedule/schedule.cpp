@@ -399,7 +399,8 @@ class Builder {
     }
     const bool first_of_all = coarsest && iteration == 0;
     if (first_of_all) candidates |= random_distance;
-    if (options_.source_planes && !first_of_all) candidates |= source_planes;
+    // Earlier, on blank walls and periods, one view's errors would spread to the other and back.
+    if (options_.source_planes && last && !first_of_all) candidates |= source_planes;
     return candidates;
   }
 
