@@ -43,7 +43,7 @@ std::vector<std::vector<float>> rings_of(const Camera& camera, const cv::Mat& br
   }
   // A corner of few pixels says little.
   const auto share = static_cast<std::size_t>(fewest_share * static_cast<double>(rays.total()));
-  const std::size_t fewest = std::min(fewest_pixels, share);
+  const std::size_t fewest = std::clamp(share, std::size_t{1}, fewest_pixels);
   while (!rings.empty() && rings.back().size() < fewest) rings.pop_back();
   return rings;
 }

@@ -77,6 +77,13 @@ TEST(LensRim, IsFoundInSmallImages) {
   }
 }
 
+TEST(LensRim, IsNotFoundInAFewPixels) {
+  Camera camera = fisheye();
+  camera.width = camera.height = 12;
+  for (double* scaled : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *scaled *= 12. / 320;
+  EXPECT_FALSE(find_lens_rim(camera, {cv::Mat(12, 12, CV_8UC1, cv::Scalar(90))}));
+}
+
 TEST(LensRim, LeavesReflectionsOut) {
   // Light falls from 88 to 94 degrees; half a lens's rim glows up to 97.
   cv::Mat image =
