@@ -17,8 +17,9 @@ namespace widestereo {
 namespace {
 
 constexpr double ring_width = 0.5 * radians_per_degree;
-constexpr std::size_t fewest_pixels = 50;                    // of a ring of a large image
-constexpr double fewest_share = 1 / 800.0;                   // of the pixels of a small one
+constexpr std::size_t fewest_pixels = 10;                    // of a ring of a small image
+constexpr std::size_t fewest_pixels_of_large = 50;           // of one from 200x200 pixels on
+constexpr double fewest_share = 1 / 800.0;                   // of an image in between
 constexpr std::size_t fewest_dark_rings = 3;                 // fewer may be noise
 constexpr std::size_t plateau_begin = 40, plateau_end = 10;  // rings inside of the dark
 constexpr float noise = 4.0F / 255;                          // of black pixels
@@ -43,7 +44,7 @@ std::vector<std::vector<float>> rings_of(const Camera& camera, const cv::Mat& br
   }
   // A corner of few pixels says little.
   const auto share = static_cast<std::size_t>(fewest_share * static_cast<double>(rays.total()));
-  const std::size_t fewest = std::clamp(share, std::size_t{1}, fewest_pixels);
+  const std::size_t fewest = std::clamp(share, fewest_pixels, fewest_pixels_of_large);
   while (!rings.empty() && rings.back().size() < fewest) rings.pop_back();
   return rings;
 }
