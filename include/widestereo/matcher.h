@@ -124,7 +124,8 @@ class Matcher {
 
   /// The same for the next frame of a sequence, from the previous frame's planes instead of from
   /// none (Options::warm_iterations): a fraction of the work where most of the scene was seen
-  /// before. Throws Error where there are no such planes.
+  /// before. Throws Error where there are no such planes. That no view sees any more what another
+  /// one does shows in the reasons alone.
   StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
                           const Progress& progress = {});
 
