@@ -134,8 +134,8 @@ ws::Rig with_limits_of(const ws::Rig& calibrated, ws::Rig rig) {
 
 void refine(const RefineArguments& arguments) {
   const cv::Size size = ws::read_image(arguments.images.front()).size();
-  const auto [calibrated, format, files] = ws::read_calibration(arguments.rig.calibration, size);
-  ws::Rig rig = calibrated;
+  const ws::Calibration calibrated = ws::read_calibration(arguments.rig.calibration, size);
+  ws::Rig rig = calibrated.rig;
   arguments.rig.limit_fields_of_view(rig);
   const std::size_t count = rig.views.size();
   if (count < 2 || arguments.images.size() % count != 0) {
@@ -144,7 +144,7 @@ void refine(const RefineArguments& arguments) {
                     " image(s); give one image of each camera, frame after frame, of two cameras "
                     "or more.");
   }
-  std::vector<std::filesystem::path> read = files;
+  std::vector<std::filesystem::path> read = calibrated.files;
   for (const auto* more : {&arguments.images, &arguments.rig.masks}) {
     read.insert(read.end(), more->begin(), more->end());
   }
@@ -154,7 +154,7 @@ void refine(const RefineArguments& arguments) {
   const std::vector<ws::ViewMatches> pairs =
       match_frames(rig, arguments.images, arguments.white_level);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);
-  arguments.output.write(with_limits_of(calibrated, refined.rig));
+  arguments.output.write(with_limits_of(calibrated.rig, refined.rig));
   if (arguments.as_json) {
     nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
     json.update(to_json(refined, pairs));

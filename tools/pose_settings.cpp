@@ -48,9 +48,8 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
                       " does not say where that is; add its T_cam_imu (Kalibr) or T_imu_cam "
                       "(Basalt), or give --poses-of camera if they are of camera 0.");
     }
-    trajectory.poses = ws::poses_of_camera(std::move(trajectory.poses), *rig.world_from_imu);
     const double ahead = rig.views.front().imu_time_offset;
-    for (ws::StampedPose& pose : trajectory.poses) pose.seconds -= ahead;
+    trajectory.poses = ws::poses_of_camera(std::move(trajectory.poses), *rig.world_from_imu, ahead);
     if (ahead != 0) {
       say(ws::formatted(
           "The IMU's poses are those at the times of the images plus %.6f s, as %s says.", ahead,

@@ -52,7 +52,8 @@ void write_kalibr(const std::filesystem::path& path, const Rig& rig);
 
 /// A Basalt JSON, for a file that errors name; T_imu_cam of view 0 is the identity where no IMU is
 /// known, and the IMU's rate, biases and noise are Basalt's defaults. Throws Error for a rig that
-/// validate() refuses, where a camera has no Basalt form, and where cameras' times differ.
+/// validate() refuses, where a camera has no Basalt form, and where the time offsets of cameras
+/// differ by more than a millisecond.
 std::string basalt_text(const std::filesystem::path& path, const Rig& rig);
 /// Writes it. Throws Error where the file cannot be written, too.
 void write_basalt(const std::filesystem::path& path, const Rig& rig);

@@ -64,9 +64,11 @@ struct Trajectory {
 /// whole nanoseconds, as many columns in every line and a quaternion of length 1.
 Trajectory read_trajectory(const std::filesystem::path& path);
 
-/// The poses of the camera from those of the IMU; with Rig::world_from_imu, those of the rig.
+/// The poses of the camera, at times of its images, from those of the IMU; with
+/// Rig::world_from_imu, those of the rig. `imu_time_offset`: the view's, seconds.
 std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
-                                         const Eigen::Isometry3d& camera_from_imu);
+                                         const Eigen::Isometry3d& camera_from_imu,
+                                         double imu_time_offset);
 
 /// The poses of the chosen ones among all frames (by index): the one nearest in time, within
 /// `tolerance` seconds, where frames have times, and no two poses of one time may differ then; else

@@ -139,7 +139,8 @@ void require_type(const cv::Mat& map, int type, const std::string& name) {
 
 void require_size(const cv::Mat& map, cv::Size size, const std::string& name) {
   if (map.dims > 2) {
-    throw Error(name + " has " + std::to_string(map.dims) + " dimensions instead of 2.");
+    throw Error(name + " has " + std::to_string(map.dims) +
+                " dimensions instead of 2; use maps of one view.");
   }
   if (map.size() == size) return;
   throw Error(name + " is " + size_text(map.cols, map.rows) + " pixels instead of " +

@@ -173,10 +173,12 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
 }
 
 std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
-                                         const Eigen::Isometry3d& camera_from_imu) {
+                                         const Eigen::Isometry3d& camera_from_imu,
+                                         double imu_time_offset) {
   const Eigen::Isometry3d imu_from_camera = camera_from_imu.inverse();
   for (StampedPose& pose : poses_of_imu) {
     pose.world_from_body = pose.world_from_body * imu_from_camera;
+    pose.seconds -= imu_time_offset;
   }
   return poses_of_imu;
 }

@@ -341,7 +341,7 @@ TEST_F(Trajectories, GroundTruthOfTheImuGivesPosesOfTheCamera) {
   for (const std::string& text : {euroc.str(), tumvi.str()}) {
     const Trajectory imu = read_trajectory(folder_.write("data.csv", text));
     EXPECT_EQ(imu.body, Body::imu);
-    const auto poses = poses_of_camera(imu.poses, camera_from_imu);
+    const auto poses = poses_of_camera(imu.poses, camera_from_imu, 0);
     ASSERT_EQ(poses.size(), 4u);
     for (std::size_t k = 0; k < 4; ++k) {
       EXPECT_NEAR(poses[k].seconds, expected[k].seconds, 3e-7);
