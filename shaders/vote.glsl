@@ -13,6 +13,10 @@
 #define LARGEST_DIFFERENCE 0.08f
 // Mean squared difference, five grey levels squared, that halves the likeness.
 #define HALVING_DIFFERENCE2 4e-4f
+// Displacement (source pixels) up to which it does not matter whether a rival is nearer or farther than the pixel's own.
+#define FREE_DISPLACEMENT 0.6f
+// Far beyond it, where the pixel's own plane matches perfectly, (1 - this) / (1 + this) of a nearer rival's votes count.
+#define NEAR_HANDICAP 0.4f
 // Random slot; the search and the regression use lower ones.
 #define VOTE_SLOT 72
 // Pixels around whose intensities tell the gain: radius and step of their grid, and the rounds over them.
@@ -87,8 +91,9 @@ FN int checked_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, OUT(vec2)
   return telling_source(CONTEXT ray, w, velocity);
 }
 
-// From 1 down by the mean squared difference of intensity over the middle of the patch, in units of the darker image. It
-// must not explain a wrong plane by a gain of its own, as a correlation of so few pixels could.
+// From 1 down by the mean squared difference of intensity over the middle of the patch, weighted by a tent as those at its
+// rim may lie beyond an edge, in units of the darker image. It must not explain a wrong plane by a gain of its own, as a
+// correlation of so few pixels could.
 FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, float gain) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
@@ -107,14 +112,25 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, fl
         float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
         if (min(a, b) < 0.0f) continue;
         float difference = min(abs(a - gain * b) * per_unit, LARGEST_DIFFERENCE);
-        n += 1.0f;
-        sum += difference * difference;
+        float weight = float((VOTE_MIDDLE_RADIUS + 1 - abs(first + dx)) * (VOTE_MIDDLE_RADIUS + 1 - abs(dy)));
+        n += weight;
+        sum += weight * difference * difference;
       }
     }
   }
   // What is not seen is as unlike as can be.
   if (n == 0.0f) return HALVING_DIFFERENCE2 / (HALVING_DIFFERENCE2 + LARGEST_DIFFERENCE * LARGEST_DIFFERENCE);
   return HALVING_DIFFERENCE2 * n / (HALVING_DIFFERENCE2 * n + sum);
+}
+
+// What a rival's votes are multiplied by that lies `nearer` (source pixels; negative: farther) than the pixel's own plane:
+// patches carry planes over the edges of nearer surfaces, hardly ever of farther ones. They do so only where there is an
+// edge to match; elsewhere, as on blank walls, neither is likelier. `cost`: that of the pixel's own plane.
+FN float preference_for_far(float nearer, float cost) {
+  float evidence = max(1.0f - cost, 0.0f);
+  float beyond = max(abs(nearer) - FREE_DISPLACEMENT, 0.0f);
+  float handicap = evidence * evidence * (NEAR_HANDICAP * (beyond / (1.0f + beyond)));
+  return nearer > 0.0f ? (1.0f - handicap) / (1.0f + handicap) : (1.0f + handicap) / (1.0f - handicap);
 }
 
 // Stores as prior (m, 1) the plane, of the pixel's own and its rivals, the candidates that the planes around support
@@ -190,6 +206,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         }
       }
       if (chosen < 0) break;
+      votes[rival] *= preference_for_far(VOTE_DISPLACEMENT * (place - own_place), held.w);
       standing[rival] = vote_candidate_at(CONTEXT pixel, chosen);
       ++count;
       UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {

@@ -55,8 +55,24 @@ TEST_F(Vote, TakesBackWhatTheNearerSurfaceSpreadOver) {
 }
 
 TEST_F(Vote, GoesByIntensityWhereTheFartherSurfaceHasSpread) {
-  hold(edge - 3, edge, far_plane);
+  hold(edge - 2, edge, far_plane);
   for (int x = edge - 8; x < edge; ++x) EXPECT_EQ(elected(x), near_plane) << "column " << x;
+}
+
+/// On one intensity, a pixel of the nearer surface beside the edge, of more near planes than far
+/// ones.
+TEST_F(Vote, GoesForTheFartherSurfaceWhereTheNearerOneMatches) {
+  constexpr float slightly_nearer = far_plane + 0.15f;  // half a pixel
+  for (const auto& [nearer, cost, expected] : {std::tuple(near_plane, 0.1f, far_plane),
+                                               {near_plane, 1.0f, near_plane},
+                                               {slightly_nearer, 0.1f, slightly_nearer}}) {
+    fill(0, size, dark, far_plane);
+    hold(0, edge, nearer);
+    for (cv::Vec4f& held : fixture_.view(0).hypotheses) held[3] = cost;
+    EXPECT_EQ(elected(edge - 1), expected) << nearer << " at cost " << cost;
+    EXPECT_EQ(elected(edge + 8), far_plane) << nearer << " at cost " << cost;
+    EXPECT_EQ(elected(edge - 8), nearer) << nearer << " at cost " << cost;
+  }
 }
 
 TEST_F(Vote, LeavesThinThingsThatLookDifferent) {
