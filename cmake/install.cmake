@@ -3,8 +3,12 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
+# Of a shared library: versions that write_basic_package_version_file() takes for each other's.
+set_target_properties(widestereo PROPERTIES VERSION ${PROJECT_VERSION}
+                                            SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/widestereo)
-install(TARGETS widestereo EXPORT widestereoTargets)
+install(TARGETS widestereo EXPORT widestereoTargets INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY include/widestereo TYPE INCLUDE)
 install(FILES LICENSE TYPE DOC)
 install(EXPORT widestereoTargets NAMESPACE widestereo:: DESTINATION ${package_folder})

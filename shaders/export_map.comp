@@ -22,18 +22,19 @@ void main() {
   uint row = conversion.first + uint(pixel.y) * conversion.pitch;
   uint x = uint(pixel.x);
   vec4 hypothesis = hypothesis_at(REFERENCE, pixel);
-  float distance = plane_distance(hypothesis, ray_at(REFERENCE, pixel));
+  vec4 ray = ray_at(REFERENCE, pixel);
   vec4 checked = check_at(REFERENCE, pixel);
   if (conversion.kind == MAP_NORMALS) {
-    vec3 normal = vec3(0.0f, 0.0f, 0.0f);
-    if (distance > 0.0f) normal = plane_normal(hypothesis);
+    vec3 normal = plane_normal(hypothesis, ray);
     map_words[row + 3u * x] = float_as_uint(normal.x);
     map_words[row + 3u * x + 1u] = float_as_uint(normal.y);
     map_words[row + 3u * x + 2u] = float_as_uint(normal.z);
   } else if (conversion.kind == MAP_REASONS) {
     map_words[row + x] = uint(checked.w);
   } else {
-    float value = conversion.kind == MAP_DISTANCE ? distance : conversion.kind == MAP_COST ? hypothesis.w : checked.z;
+    float value = conversion.kind == MAP_DISTANCE ? plane_distance(hypothesis, ray)
+                  : conversion.kind == MAP_COST   ? hypothesis.w
+                                                  : checked.z;
     map_words[row + x] = float_as_uint(value);
   }
 }

@@ -41,8 +41,9 @@ FN float plane_distance(vec4 hypothesis, vec4 ray) {
   return 1.0f / w;
 }
 
-// Unit normal, facing the camera, of a plane (m, cost) that the pixel holds.
-FN vec3 plane_normal(vec4 hypothesis) {
+// Its unit normal, facing the camera, 0 where it holds none.
+FN vec3 plane_normal(vec4 hypothesis, vec4 ray) {
+  if (plane_distance(hypothesis, ray) == 0.0f) return vec3(0.0f, 0.0f, 0.0f);
   vec3 m = vec3(hypothesis.x, hypothesis.y, hypothesis.z);
   return (-1.0f / length(m)) * m;
 }

@@ -11,6 +11,7 @@
 #include "matching_run.h"
 #include "option_checks.h"
 #include "roofline.h"
+#include "schedule/option_names.h"
 #include "text/formatted.h"
 #include "text/json_text.h"
 #include "widestereo/error.h"
@@ -169,18 +170,18 @@ void add_benchmark_command(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--sizes", a->sizes, "Sides of the square images, pixels (several by comma)")
       ->delimiter(',')
-      ->check(CLI::Range(64, 4096))
+      ->check(CLI::Range(ws::least_demo_size, ws::largest_demo_size))
       ->capture_default_str();
   command
       ->add_option("--window-radii", a->window_radii,
                    "Patches of (2 r + 1)^2 pixels (several by comma), the presets' own by default")
       ->delimiter(',')
-      ->check(CLI::Range(1, 15));
+      ->check(CLI::Range(1, ws::Options::largest_window_radius));
   command->add_option("--warp", a->warp, "Instead of the presets' own")
-      ->transform(warp_names())
+      ->transform(name_among(ws::warp_names))
       ->type_name("TEXT");
   command->add_option("--filter", a->filter, "Instead of the presets' own")
-      ->transform(filter_names())
+      ->transform(name_among(ws::filter_names))
       ->type_name("TEXT");
   command->add_option("--runs", a->runs, "Timed runs of each")
       ->check(CLI::Range(1, 1000))

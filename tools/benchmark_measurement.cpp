@@ -123,6 +123,7 @@ Json json_of(const Measurement& m) {
   }
   return {{"device", m.device.id},
           {"name", m.device.name},
+          {"driver", m.device.driver},
           {"preset", m.preset},
           {"size", m.size},
           {"window_radius", m.window_radius},

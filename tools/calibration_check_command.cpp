@@ -6,6 +6,7 @@
 #include <string>
 
 #include "calibration_commands.h"
+#include "option_checks.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
 #include "text/formatted.h"
@@ -70,6 +71,7 @@ std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
 }
 
 void check(const CheckArguments& arguments) {
+  require_different_images({arguments.left, arguments.right});
   const cv::Mat left = arguments.white_level.read(arguments.left);
   const cv::Mat right = arguments.white_level.read(arguments.right);
   const ws::CalibratedImages images =

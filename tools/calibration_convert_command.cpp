@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <iostream>
 #include <memory>
 #include <string>
 
@@ -7,6 +6,7 @@
 #include "calibration_output.h"
 #include "option_checks.h"
 #include "rig_settings.h"
+#include "say.h"
 #include "widestereo/calibration.h"
 
 namespace ws = widestereo;
@@ -22,7 +22,7 @@ void convert(const ConvertArguments& arguments) {
   const ws::Calibration calibration = ws::read_calibration(arguments.input);
   require_other_file(arguments.output.file, calibration.files);
   arguments.output.write(calibration.rig);
-  std::cout << "Wrote " << arguments.output.file << "\n";
+  say("Wrote " + arguments.output.file + ".");
 }
 
 }  // namespace

@@ -162,7 +162,7 @@ void refine(const RefineArguments& arguments) {
     return;
   }
   print(refined, pairs, arguments.intrinsics);
-  std::cout << "Wrote " << arguments.output.file << "\n";
+  say("Wrote " + arguments.output.file + ".");
 }
 
 }  // namespace

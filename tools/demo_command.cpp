@@ -42,8 +42,8 @@ void run_demo(DemoArguments arguments) {
   const auto [nearest, farthest] = ws::demo_distance_range();
   if (!arguments.settings.min_distance) arguments.settings.min_distance = nearest;
   if (!arguments.settings.max_distance) arguments.settings.max_distance = farthest;
-  arguments.format.require_room_for(*arguments.settings.min_distance,
-                                    *arguments.settings.max_distance);
+  const ws::Options options = arguments.settings.options();
+  arguments.format.require_room_for(options.min_distance, options.max_distance);
 
   std::vector<cv::Mat> images;
   std::vector<ws::GroundTruth> truths;
@@ -79,7 +79,7 @@ void add_demo_command(CLI::App& app) {
   command
       ->add_option("--size", arguments->size,
                    "Side of the square images, pixels; of panoramas, height")
-      ->check(CLI::Range(64, 4096))
+      ->check(CLI::Range(ws::least_demo_size, ws::largest_demo_size))
       ->capture_default_str();
   command->add_flag("--panorama", arguments->panorama,
                     "See the whole sphere in equirectangular images, in place of two fisheyes");

@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "match_settings.h"
 #include "matching_run.h"
+#include "option_checks.h"
 #include "pose_settings.h"
 #include "result_folder.h"
 #include "rig_settings.h"
@@ -73,6 +74,7 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
 void run_depth(const DepthArguments& arguments) {
   const std::optional<ws::SfmModel> model = arguments.rig.sfm_model();
   const std::vector<std::string> files = files_of(arguments, model);
+  require_different_images({files.begin(), files.end()});
   std::vector<cv::Mat> images;
   for (const std::string& file : files) images.push_back(arguments.white_level.read(file));
   ws::CalibratedImages calibrated =

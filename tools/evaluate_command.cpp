@@ -3,11 +3,12 @@
 #include <iostream>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "commands.h"
+#include "map_checks.h"
 #include "option_checks.h"
 #include "result_folder.h"
-#include "size_settings.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -35,6 +36,14 @@ cv::Mat read_labels(const fs::path& path) {
   if (image.type() != CV_8UC1)
     throw ws::Error(path.string() + " is not an 8-bit grey image; convert it first.");
   return image;
+}
+
+/// A map of one value a pixel (distance, confidence) or three (normals).
+cv::Mat read_map(const std::string& file, int values, const std::string& what,
+                 double png_scale = FolderFormat::usual_png_scale) {
+  cv::Mat map = ws::read_map(file, png_scale);
+  require_values(map, file, values, what);
+  return map;
 }
 
 /// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),
@@ -70,10 +79,10 @@ void run_evaluate(EvaluateArguments a) {
                         a.truth_normals, a.image, a.field_of_view, a.calibration});
   }
   ws::GroundTruth truth;
-  truth.distance = ws::read_map(a.truth);
+  truth.distance = read_map(a.truth, 1, "a distance map");
   if (!a.valid.empty()) truth.valid = read_labels(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
-  if (!a.truth_normals.empty()) truth.normals = ws::read_map(a.truth_normals);
+  if (!a.truth_normals.empty()) truth.normals = read_map(a.truth_normals, 3, "a normal map");
   if (!a.image.empty()) truth.image = ws::read_grey_levels(a.image);
   if (!a.normals.empty() && a.truth_normals.empty()) {
     throw ws::Error("--normals needs --truth-normals, or a folder with them by --set.");
@@ -84,10 +93,20 @@ void run_evaluate(EvaluateArguments a) {
     }
     truth.field_of_view = read_labels(a.field_of_view);
   }
-  const cv::Mat prediction = ws::read_map(a.prediction, a.png_scale);
+  const cv::Mat prediction = read_map(a.prediction, 1, "a distance map", a.png_scale);
   require_same_size(prediction, a.prediction, truth.distance, a.truth,
                     "score maps that were matched at that size, without --max-image-size");
-  const cv::Mat normals = a.normals.empty() ? cv::Mat() : ws::read_map(a.normals);
+  const cv::Mat normals = a.normals.empty() ? cv::Mat() : read_map(a.normals, 3, "a normal map");
+  const cv::Mat confidence =
+      a.confidence.empty() ? cv::Mat() : read_map(a.confidence, 1, "a confidence map");
+  using OfFile = std::pair<cv::Mat, std::string>;
+  for (const auto& [map, file] :
+       {OfFile(normals, a.normals), OfFile(confidence, a.confidence), OfFile(truth.valid, a.valid),
+        OfFile(truth.occlusion, a.occlusion), OfFile(truth.normals, a.truth_normals),
+        OfFile(truth.image, a.image), OfFile(truth.field_of_view, a.field_of_view)}) {
+    if (map.empty()) continue;
+    require_same_size(map, file, prediction, a.prediction, "use maps of one view");
+  }
   const ws::Rig rig = ws::read_calibration(a.calibration, prediction.size()).rig;
   const int views = static_cast<int>(rig.views.size());
   if (a.view < 0 || a.view >= views || a.source < 0 || a.source >= views || a.view == a.source) {
@@ -107,11 +126,11 @@ void run_evaluate(EvaluateArguments a) {
   std::vector<ws::SparsificationPoint> curve;
   std::vector<ws::ReliabilityBin> bins;
   if (!a.confidence.empty()) {
-    const cv::Mat confidence = ws::read_map(a.confidence);
     curve =
         ws::sparsification(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
     bins = ws::reliability(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
   }
+  if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
   if (a.as_json) {
     std::cout << "{\"regions\": " << ws::to_json(scores)
               << ", \"far\": " << (a.far_distance > 0 ? ws::to_json(far) : "null")
@@ -121,7 +140,6 @@ void run_evaluate(EvaluateArguments a) {
     std::cout << ws::to_table(scores) << ws::to_table(far) << ws::to_table(curve)
               << ws::to_table(bins);
   }
-  if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
 }
 
 }  // namespace

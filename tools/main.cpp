@@ -72,7 +72,7 @@ int run(int argc, char** argv) {
     say(unknown);
     return error.get_exit_code();
   } catch (const CLI::ConversionError& error) {
-    // Words have been found to be numbers: just their range is left.
+    // Words have been found to be such numbers, or true or false: just a number's range is left.
     say(std::string(error.what()) + "; it is too large, or negative where it may not be.");
     return error.get_exit_code();
   } catch (const CLI::ParseError& error) {

@@ -5,15 +5,10 @@
 #include <type_traits>
 
 #include "option_checks.h"
+#include "schedule/option_names.h"
 #include "widestereo/error.h"
 
-using widestereo::DistanceSampling;
-using widestereo::Filter;
-using widestereo::Interpolation;
 using widestereo::Options;
-using widestereo::PatchPattern;
-using widestereo::PatchWarp;
-using widestereo::Propagation;
 using widestereo::SearchMethod;
 
 namespace {
@@ -26,16 +21,6 @@ void fit_to_levels(std::vector<int>& of_levels, int levels) {
 }
 
 }  // namespace
-
-CLI::Validator warp_names() {
-  return name_among<PatchWarp>({{"exact", PatchWarp::exact},
-                                {"affine", PatchWarp::affine},
-                                {"quadratic", PatchWarp::quadratic}});
-}
-
-CLI::Validator filter_names() {
-  return name_among<Filter>({{"exact", Filter::exact}, {"device", Filter::device}});
-}
 
 void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
   const std::string devices = "Device";
@@ -90,13 +75,12 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
   const auto add_pyramid = adder(matching, SearchMethod::pyramid);
   add("--seed", &Options::seed, "Seed of the random numbers");
   add("--window-radius", &Options::window_radius, "Patch of (2 r + 1)^2 pixels");
-  add("--warp", &Options::warp, "How a patch is mapped")->transform(warp_names());
+  add("--warp", &Options::warp, "How a patch is mapped")
+      ->transform(name_among(widestereo::warp_names));
   add_random("--sampling", &Options::sampling, "How distances are drawn")
-      ->transform(name_among<DistanceSampling>(
-          {{"uniform", DistanceSampling::uniform}, {"inverse", DistanceSampling::inverse}}));
+      ->transform(name_among(widestereo::sampling_names));
   add("--propagation", &Options::propagation, "Order of pixels; raster on the CPU only")
-      ->transform(name_among<Propagation>(
-          {{"checkerboard", Propagation::checkerboard}, {"raster", Propagation::raster}}));
+      ->transform(name_among(widestereo::propagation_names));
   add_random("--iterations", &Options::first_iterations,
              "Preset paper: iterations of the first view");
   add_random("--second-iterations", &Options::second_iterations,
@@ -104,15 +88,13 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
   add_random("--refinements", &Options::refinements,
              "Preset paper: random perturbations per pixel and iteration");
   add("--pattern", &Options::pattern, "Pixels of a patch that are compared")
-      ->transform(name_among<PatchPattern>(
-          {{"dense", PatchPattern::dense}, {"checkerboard", PatchPattern::checkerboard}}));
+      ->transform(name_among(widestereo::pattern_names));
   add("--weight-scale", &Options::weight_scale,
       "Intensity scale of patch weights, grey levels; 0 = none");
   add("--interpolation", &Options::interpolation, "Intensities halfway between a source's pixels")
-      ->transform(name_among<Interpolation>(
-          {{"linear", Interpolation::linear}, {"cubic", Interpolation::cubic}}));
+      ->transform(name_among(widestereo::interpolation_names));
   add("--filter", &Options::filter, "Bilinear samples of those; device: by a GPU's texture units")
-      ->transform(filter_names());
+      ->transform(name_among(widestereo::filter_names));
   add_pyramid("--levels", &Options::levels, "Levels of the image pyramid");
   add_pyramid("--sweep-steps", &Options::sweep_steps,
               "Inverse distances tried at the coarsest level");
@@ -223,7 +205,7 @@ Options MatchSettings::options() const {
 
 bool MatchSettings::asks_for_device_filter() const {
   Options options;
-  options.filter = Filter::exact;
+  options.filter = widestereo::Filter::exact;
   for (const Parameter& parameter : given_) parameter.set(options);
-  return options.filter == Filter::device;
+  return options.filter == widestereo::Filter::device;
 }

@@ -11,10 +11,6 @@
 #include "widestereo/device.h"
 #include "widestereo/options.h"
 
-/// Turn the names of an option into its values.
-CLI::Validator warp_names();
-CLI::Validator filter_names();
-
 /// Values given on the command line; the rest comes from the preset.
 struct MatchSettings {
   std::string preset = "quality";

@@ -107,7 +107,7 @@ MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
   run.lock = std::make_shared<const FolderLock>(output);
   {
     ProgressBar bar("Matching on " + device.info().name);
-    run.result = matcher.match(images, [&bar](double share) { bar.show(share); });
+    run.result = matcher.match(images, bar.part(0, 1));
   }
   require_no_validation_messages(device);
   report_views_without_overlap(rig, run.result);

@@ -35,10 +35,9 @@ widestereo::Device open_device(const MatchSettings& settings);
 /// Throws Error when validation was asked for and reported anything.
 void require_no_validation_messages(const widestereo::Device& device);
 
-/// Says, on standard error, which images show nothing but noise: black ones, of a covered lens or a
-/// camera that failed.
 /// Whether an image shows nothing but noise where the mask, which may be empty, is not 0.
 bool is_blank(const cv::Mat& image, const cv::Mat& mask);
+/// Says, on standard error, which images do: black ones, of a covered lens or a camera that failed.
 void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
 
 /// Says, on standard error, which views see nothing that another one does.

@@ -2,6 +2,7 @@
 #include "option_checks.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -20,12 +21,23 @@ std::string make_decimal(std::string& word) {
   return "";
 }
 
+bool is_truth_value(const std::string& word) {
+  try {
+    CLI::detail::to_flag_value(word);
+    return true;
+  } catch (const std::invalid_argument&) {
+    return false;
+  }
+}
+
 CLI::Validator word_check(const std::string& type) {
+  const bool of_truth = type == "BOOLEAN";
   const bool of_number = type.starts_with("FLOAT");
   const bool of_whole_number = type.starts_with("INT") || type.starts_with("UINT");
   return CLI::Validator(
-      [of_number, of_whole_number](std::string& word) -> std::string {
+      [of_truth, of_number, of_whole_number](std::string& word) -> std::string {
         if (word.empty()) return "the value is empty; give one, or leave the option out";
+        if (of_truth && !is_truth_value(word)) return word + " is neither true nor false";
         if (of_number && !widestereo::number_of(word)) {
           return word + " is no finite number";
         }
@@ -60,6 +72,16 @@ void require_other_file(const std::filesystem::path& output,
     if (!std::filesystem::equivalent(input, output, missing)) continue;
     throw ws::Error(output.string() +
                     " is among the files that are read; choose another file to write.");
+  }
+}
+
+void require_different_images(const std::vector<std::filesystem::path>& images) {
+  for (auto image = images.begin(); image != images.end(); ++image) {
+    for (auto other = images.begin(); other != image; ++other) {
+      std::error_code missing;
+      if (!std::filesystem::equivalent(*image, *other, missing)) continue;
+      throw ws::Error(image->string() + " is given twice; give another image for each view.");
+    }
   }
 }
 

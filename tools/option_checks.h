@@ -35,6 +35,9 @@ CLI::Validator name_among(const std::vector<std::pair<std::string, Value>>& name
 void require_other_file(const std::filesystem::path& output,
                         const std::vector<std::filesystem::path>& inputs);
 
+/// Throws Error where an image is given twice: it would match itself at any distance.
+void require_different_images(const std::vector<std::filesystem::path>& images);
+
 /// Makes every option, of subcommands too, refuse an empty word, and where it takes numbers NaN and
 /// infinity, and read whole numbers by their decimal digits.
 void check_words_of(CLI::App& app);

@@ -178,8 +178,7 @@ std::vector<bool> PosedImageSettings::apply_masks(PosedImages& posed) const {
     const fs::path mask = mask_of(view);
     if (!fs::exists(mask)) continue;
     masked[i] = true;
-    view.mask = ws::read_mask(mask);
-    ws::require_calibrated_size(view.mask, view, mask.string());
+    add_mask(view, ws::read_mask(mask), mask.string());
   }
   const bool found = std::find(masked.begin(), masked.end(), true) != masked.end();
   if (!found && !posed.calibrated.empty()) {
@@ -195,6 +194,7 @@ void PosedImageSettings::leave_out_dark_rims(PosedImages& posed,
   for (std::size_t first = 0; first < posed.views.size(); ++first) {
     if (done[first]) continue;
     const ws::Camera camera = posed.views[first].camera;
+    if (!rig.looks_for_rim_of(camera)) continue;
     Images of_camera;
     for (std::size_t i = first; i < posed.views.size(); ++i) {
       if (!masked[i] && posed.views[i].camera == camera) of_camera.push_back(i);

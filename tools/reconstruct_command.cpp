@@ -32,6 +32,10 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+/// The points of all images, and their picture.
+constexpr const char* cloud_name = "cloud.ply";
+constexpr const char* cloud_picture_name = "cloud_preview.png";
+
 const cv::Size preview_size(1024, 768);
 
 struct ReconstructArguments {
@@ -138,7 +142,8 @@ class Reconstruction {
                  {.name = ResultFolders::reconstruction,
                   .results = "images",
                   .texts = {},
-                  .numbers = {"accepted"}},
+                  .numbers = {"accepted"},
+                  .files = {cloud_name, cloud_picture_name}},
                  settings_of(arguments, groups_, options_.front(), device_.info()),
                  arguments.overwrite) {}
 
@@ -182,13 +187,19 @@ class Reconstruction {
     for (std::size_t i = 0; i < groups_.size(); ++i) {
       const Json inputs = inputs_of(i);
       for (const std::size_t image : groups_[i]) {
-        wanted.emplace(images_.views[image].name, std::pair{image, inputs});
+        const std::string& name = images_.views[image].name;
+        folders_.require_usable(name);
+        wanted.emplace(name, std::pair{image, inputs});
       }
     }
     Json kept = Json::array();
+    std::size_t not_given = 0;
     for (const Json& result : folders_.results()) {
       const auto image = wanted.find(result["name"].get<std::string>());
-      if (image == wanted.end()) continue;
+      if (image == wanted.end()) {
+        ++not_given;
+        continue;
+      }
       Json of_inputs = result;
       of_inputs.update(image->second.second);
       if (of_inputs != result || !folders_.is_there(result)) continue;
@@ -196,6 +207,10 @@ class Reconstruction {
       matched_[image->second.first] = true;
     }
     folders_.keep(kept);
+    if (not_given > 0) {
+      say("The results of " + std::to_string(not_given) +
+          " images that are not given now will be removed.");
+    }
     if (kept.empty()) return;
     say(std::to_string(kept.size()) + " of " + std::to_string(wanted.size() - alone_in(groups_)) +
         " images are kept as an earlier run matched them.");
@@ -294,14 +309,14 @@ class Reconstruction {
     const ws::PointCloud cloud = ws::fuse(
         views, others, [&](std::size_t view) { return maps_of(numbers[view]); }, arguments_.fusion,
         [&bar](double share) { bar.show(share); });
-    ws::write_ply(folders_.folder() / "cloud.ply", cloud);
+    ws::write_ply(folders_.folder() / cloud_name, cloud);
     const std::size_t middle = numbers[numbers.size() / 2];
     const ws::ColourRange range = ws::robust_range(distance_of(middle));
     ws::write_image(
-        folders_.folder() / "cloud_preview.png",
+        folders_.folder() / cloud_picture_name,
         ws::cloud_picture(cloud, viewpoint_behind(images_.views[middle].world_from_camera, range),
                           preview_size));
-    folders_.note("cloud", {{"file", "cloud.ply"},
+    folders_.note("cloud", {{"file", cloud_name},
                             {"points", cloud.size()},
                             {"images", views.size()},
                             {"origin", to_json(images_.origin)},
@@ -332,7 +347,7 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   const auto count = static_cast<double>(record["images"].size());
   std::printf("%.0f images, %.1f %% accepted on average; %zu points in %s\n", count,
               100 * accepted / count, record["cloud"]["points"].get<std::size_t>(),
-              (reconstruction.folders().folder() / "cloud.ply").string().c_str());
+              (reconstruction.folders().folder() / cloud_name).string().c_str());
   report_little_accepted(accepted / count, "the poses (of the camera in the world, or of the IMU)");
 }
 

@@ -212,6 +212,16 @@ class ViewWriter {
   Json files_;
 };
 
+/// Those of rejected pixels, as "1 no ray, 2 no overlap".
+std::string reason_bits() {
+  std::string bits;
+  for (const auto& [bit, name] : ws::named_reasons) {
+    if (bit == ws::reason_filled) continue;
+    bits += (bits.empty() ? "" : ", ") + std::to_string(bit) + " " + name;
+  }
+  return bits;
+}
+
 Json record_of(const FolderContents& contents, const FolderFormat& format) {
   const MatchingRun& run = contents.run;
   Json record = {{"program", "widestereo " WIDESTEREO_VERSION}};
@@ -245,10 +255,8 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"confidence",
        "probability that the point is within 2 px of its true place in the other view; 0 = no "
        "plane of its own"},
-      {"reasons",
-       "bits: 1 no ray, 2 no overlap, 4 no texture, 8 high cost, 16 inconsistent, "
-       "32 unchecked, 64 low parallax, 128 tilt, 256 ambiguous, 512 speckle, 2048 low confidence, "
-       "and 1024 beside these where the pixel was filled; 0 = accepted; 16 bit"},
+      {"reasons", "bits: " + reason_bits() + ", and " + std::to_string(ws::reason_filled) +
+                      " beside these where the pixel was filled; 0 = accepted; 16 bit"},
       {"cloud", "world frame, accepted pixels"},
       {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},

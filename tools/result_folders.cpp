@@ -134,6 +134,19 @@ bool ResultFolders::is_there(const Json& result) const {
                      [&path](const auto& file) { return fs::exists(path / file); });
 }
 
+void ResultFolders::require_usable(const std::string& name) const {
+  if (!is_within_folder(name)) {
+    throw ws::Error("A result named " + name + " would not lie within " + folder_.string() +
+                    "; rename its images.");
+  }
+  std::vector<std::string> taken = kind_.files;
+  taken.insert(taken.end(), {record_path(kind_.name).filename(), unfinished_result, removed});
+  const std::string first = fs::path(name).begin()->string();
+  if (std::find(taken.begin(), taken.end(), first) == taken.end()) return;
+  throw ws::Error("A result named " + name + " would lie where the " + kind_.name + " has its " +
+                  first + "; rename its images.");
+}
+
 void ResultFolders::remove(const std::string& name) const {
   const fs::path path = folder_ / name;
   if (!fs::exists(path)) return;
@@ -154,10 +167,7 @@ void ResultFolders::remove(const std::string& name) const {
 
 void ResultFolders::add(const std::string& name,
                         const std::function<Json(const fs::path&)>& write) {
-  if (!is_within_folder(name)) {
-    throw ws::Error("A result named " + name + " would not lie within " + folder_.string() +
-                    "; rename its images.");
-  }
+  require_usable(name);
   const TemporaryFolder temporary(folder_ / unfinished_result);
   Json result = write(temporary.path());
   remove(name);

@@ -24,10 +24,11 @@ class ResultFolders {
   static constexpr const char* reconstruction = "reconstruction";
 
   struct Kind {
-    std::string name;                  ///< of the run, as above: the record is NAME.json
-    std::string results;               ///< what it has many of, the record's key
-    std::vector<std::string> texts;    ///< that the record of each result has
-    std::vector<std::string> numbers;  ///< likewise
+    std::string name;                     ///< of the run, as above: the record is NAME.json
+    std::string results;                  ///< what it has many of, the record's key
+    std::vector<std::string> texts;       ///< that the record of each result has
+    std::vector<std::string> numbers;     ///< likewise
+    std::vector<std::string> files = {};  ///< of the whole run, besides its record
   };
 
   /// Takes up the folder where an earlier run left it; throws Error where that was of another kind.
@@ -48,12 +49,16 @@ class ResultFolders {
   /// `record`: of a result.
   bool is_of_this_kind(const Json& record) const;
 
+  /// Throws Error where a result cannot have the name, for it leads out of the folder, or is that
+  /// of a file of the whole run.
+  void require_usable(const std::string& name) const;
+
   /// What FolderContents::origin says of whose result it is.
   Json origin() const { return {{"run", kind_.name}}; }
 
   /// Adds a result: `write` fills the folder that it is given, with that origin, and returns the
   /// record, which has the name. The result appears when all of it is there. Throws Error where
-  /// something else has the name, or where it leads out of the folder.
+  /// something else has the name, or where it is not usable.
   void add(const std::string& name, const std::function<Json(const std::filesystem::path&)>& write);
 
   /// Notes something of the whole run in the record.

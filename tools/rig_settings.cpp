@@ -78,6 +78,12 @@ ws::CalibratedImages RigSettings::images_of(const ws::SfmModel& model,
   return images;
 }
 
+void add_mask(ws::View& view, const cv::Mat& mask, const std::string& name) {
+  ws::require_calibrated_size(mask, view, name);
+  // Not &=, as other views may share the pixels.
+  view.mask = view.mask.empty() ? mask : cv::Mat(view.mask & mask);
+}
+
 void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
   if (masks.size() > 1 && masks.size() != rig.views.size()) {
     throw ws::Error("--mask names " + std::to_string(masks.size()) + " images for " +
@@ -96,18 +102,20 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
     if (max_theta > 0) view.camera.max_theta = max_theta * ws::radians_per_degree;
     if (read.empty()) continue;
     const std::size_t mask = read.size() == 1 ? 0 : i;
-    view.mask = read[mask];
-    ws::require_calibrated_size(view.mask, view, masks[mask]);
+    add_mask(view, read[mask], masks[mask]);
   }
 }
 
+bool RigSettings::looks_for_rim_of(const ws::Camera& camera) const {
+  return max_theta == 0 && masks.empty() && camera.max_theta >= std::numbers::pi;
+}
+
 void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& images) const {
-  if (max_theta > 0 || !masks.empty()) return;
   const std::vector<ws::View> calibrated = rig.views;
   std::vector<bool> limited(calibrated.size());
   for (std::size_t i = 0; i < calibrated.size(); ++i) {
     const ws::Camera& camera = calibrated[i].camera;
-    if (limited[i] || camera.max_theta < std::numbers::pi) continue;
+    if (limited[i] || !looks_for_rim_of(camera)) continue;
     // One camera may have taken several views.
     std::vector<std::size_t> of_camera;
     std::vector<cv::Mat> seen;

@@ -11,6 +11,10 @@
 #include "widestereo/rig.h"
 #include "widestereo/sfm_model.h"
 
+/// Ignores what a mask ignores, besides what the view's own does. `name`, the file, begins
+/// messages.
+void add_mask(widestereo::View& view, const cv::Mat& mask, const std::string& name);
+
 struct RigSettings {
   std::string calibration;         ///< file, or what is_sfm_model() knows
   std::vector<int> views;          ///< cameras of the calibration; empty: the first ones
@@ -41,8 +45,9 @@ struct RigSettings {
   widestereo::CalibratedImages images_of(const widestereo::SfmModel& model,
                                          const std::vector<std::string>& files) const;
 
-  /// Limits the cameras of which nothing says how far they see to what their images show, and says
-  /// so; one image for each view.
+  /// Whether nothing says how far a camera sees.
+  bool looks_for_rim_of(const widestereo::Camera& camera) const;
+  /// Limits such cameras to what their images show, and says so; one image for each view.
   void leave_out_dark_rims(widestereo::Rig& rig, const std::vector<cv::Mat>& images) const;
 
   /// Applies --mask and --max-theta.

@@ -5,17 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "geometry/validation.h"
-#include "text/size_text.h"
-#include "widestereo/error.h"
 
 namespace ws = widestereo;
-
-void require_same_size(const cv::Mat& map, const std::string& name, const cv::Mat& other,
-                       const std::string& other_name, const std::string& remedy) {
-  if (map.size() == other.size()) return;
-  throw ws::Error(name + " is " + ws::size_text(map.cols, map.rows) + " pixels, but " + other_name +
-                  " is " + ws::size_text(other.cols, other.rows) + "; " + remedy + ".");
-}
 
 void SizeSettings::add_to(CLI::App& command, const std::string& help) {
   command.add_option("--max-image-size", largest_side_, help)

@@ -8,11 +8,6 @@
 
 #include "widestereo/rig.h"
 
-/// Throws Error where a map is not of the size of another one, which it would have with the right
-/// --max-image-size; `remedy`: a clause.
-void require_same_size(const cv::Mat& map, const std::string& name, const cv::Mat& other,
-                       const std::string& other_name, const std::string& remedy);
-
 class SizeSettings {
  public:
   static constexpr const char* of_a_match =

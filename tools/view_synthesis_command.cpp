@@ -4,6 +4,7 @@
 #include <string>
 
 #include "commands.h"
+#include "map_checks.h"
 #include "option_checks.h"
 #include "pose_settings.h"
 #include "result_folder.h"
@@ -41,6 +42,7 @@ void run_synthesis(const SynthesisArguments& a) {
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
   const cv::Mat distance = ws::read_map(a.distance, a.png_scale);
+  require_values(distance, a.distance, 1, "a distance map");
   image = a.size.reduced(image, rig.views[0], a.image);
   other = a.size.reduced(other, rig.views[1], a.other);
   require_same_size(distance, a.distance, image, a.image,
@@ -53,12 +55,12 @@ void run_synthesis(const SynthesisArguments& a) {
                     " sees at the distances of " + a.distance +
                     "; check that they belong together.");
   }
-  std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
   if (!a.picture.empty()) {
     cv::Mat picture;
     synthesised.image.convertTo(picture, CV_8U);
     ws::write_image(a.picture, picture);
   }
+  std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
 }
 
 }  // namespace

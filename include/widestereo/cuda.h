@@ -32,8 +32,8 @@ struct CudaWarmStart {
   /// The first three rows of the same matrix, row after row (12 values), in device memory, instead:
   /// read when the work runs.
   const double* device_now_from_previous = nullptr;
-  /// As WarmStart::frame. Left out: counted on the device, 1 for the matcher's first warm start
-  /// that runs, then one more for each.
+  /// As WarmStart::frame. Left out: counted on the device, one more than that of the matcher's
+  /// warm start that ran before, from 1 on.
   std::optional<int> frame = std::nullopt;
 };
 

@@ -20,9 +20,9 @@ struct DevicePeaks {
 struct DeviceInfo {
   DeviceKind kind = DeviceKind::cpu;
   std::string id;        ///< what Device::open takes: "cpu", "vulkan:0", "cuda:0"
-  std::string name;      ///< as the driver says
+  std::string name;      ///< as the driver says; what has the same one gives the same results
   std::string type;      ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu", "other"
-  std::string driver;    ///< name and version, where known
+  std::string driver;    ///< name and version, where known; of the CPU, its threads
   std::string uuid;      ///< 32 hexadecimal digits, empty for the CPU
   std::string unusable;  ///< why the device cannot be used, empty if it can
   DevicePeaks peaks;     ///< known for CUDA devices only

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -30,6 +31,26 @@ enum Reason : std::uint16_t {
   reason_filled = 1024,      ///< not a reason: the rejected pixel took the plane of accepted ones
   reason_low_confidence = 2048,  ///< confidence below Options::min_confidence
 };
+
+/// What a bit of ViewResult::reasons is called.
+struct NamedReason {
+  Reason bit;
+  const char* name;
+};
+/// In the order of the bits, from 1 on.
+inline constexpr std::array<NamedReason, 12> named_reasons = {
+    {{reason_no_ray, "no ray"},
+     {reason_no_overlap, "no overlap"},
+     {reason_no_texture, "no texture"},
+     {reason_high_cost, "high cost"},
+     {reason_inconsistent, "inconsistent"},
+     {reason_unchecked, "unchecked"},
+     {reason_low_parallax, "low parallax"},
+     {reason_tilt, "tilt"},
+     {reason_ambiguous, "ambiguous"},
+     {reason_speckle, "speckle"},
+     {reason_filled, "filled"},
+     {reason_low_confidence, "low confidence"}}};
 
 /// Result for one reference view. All maps have the view's size.
 struct ViewResult {

@@ -62,6 +62,7 @@ struct Options {
   /// What distances may be: the matcher squares them, and their inverses, in single precision.
   static constexpr double least_distance = 1e-6, most_distance = 1e9;
   static constexpr int most_levels = 4;
+  static constexpr int largest_window_radius = 15;  ///< pixels
 
   std::string preset = "paper";
   double min_distance = 0.3;  ///< metres along the ray, at least least_distance
@@ -69,7 +70,7 @@ struct Options {
   std::uint32_t seed = 1;
 
   SearchMethod search = SearchMethod::random;
-  int window_radius = 5;  ///< patch of (2 r + 1)^2 pixels, 1..15
+  int window_radius = 5;  ///< patch of (2 r + 1)^2 pixels, 1..largest_window_radius
   PatchWarp warp = PatchWarp::exact;
   DistanceSampling sampling = DistanceSampling::uniform;
   Propagation propagation = Propagation::checkerboard;

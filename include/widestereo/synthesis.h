@@ -25,6 +25,9 @@ struct RenderedPair {
   std::vector<RenderedView> views;  ///< as many as rig.views
 };
 
+/// Sides of the images of demo_rig() and surround_rig() that commands offer, pixels.
+inline constexpr int least_demo_size = 64, largest_demo_size = 4096;
+
 /// The cameras of `widestereo demo`: two double spheres of 195 degrees with a 0.1 m baseline.
 /// `size` is the side of the square images in pixels; the field of view does not depend on it.
 Rig demo_rig(int size);

@@ -18,9 +18,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Extra key of ours: half angles of the fields of view in degrees, one for each camera.
-constexpr const char* max_theta_key = "max_theta_deg";
-
 constexpr const char* time_offset_key = "cam_time_offset_ns";
 constexpr double nanoseconds_per_second = 1e9;
 
@@ -219,7 +216,8 @@ Rig read_basalt(const Document& document) {
       if (value.contains(max_theta_key)) {
         const Json& limits = list(document, value, max_theta_key);
         if (limits.size() != cameras.size() || !limits[i].is_number()) {
-          document.fail("\"max_theta_deg\" must hold one number for each camera.");
+          document.fail(std::string("\"") + max_theta_key +
+                        "\" must hold one number for each camera.");
         }
         view.camera.max_theta = limits[i].get<double>() * radians_per_degree;
       }

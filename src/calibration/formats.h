@@ -11,6 +11,9 @@
 
 namespace widestereo::calibration {
 
+/// Extra key of ours in camchains and Basalt's JSON: half angles of the fields of view in degrees.
+inline constexpr const char* max_theta_key = "max_theta_deg";
+
 /// A file being read: its content, and its name for messages.
 struct Document {
   std::filesystem::path path;

@@ -159,7 +159,7 @@ std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
     out << YAML::Key << "resolution" << YAML::Value << YAML::Flow
         << calibration::texts_of<int>({view.camera.width, view.camera.height});
     if (view.camera.max_theta < std::numbers::pi) {
-      out << YAML::Key << "max_theta_deg" << YAML::Value
+      out << YAML::Key << calibration::max_theta_key << YAML::Value
           << text_of(view.camera.max_theta * degrees_per_radian);
     }
     const auto motion = [&out](const char* key, const Eigen::Matrix4d& t) {

@@ -186,8 +186,8 @@ View YamlCamera::view() const {
   set_projection(view.camera);
   set_distortion(view.camera);
   set_resolution(view.camera);
-  if (has("max_theta_deg")) {
-    view.camera.max_theta = number(node_["max_theta_deg"], "max_theta_deg") * radians_per_degree;
+  if (has(max_theta_key)) {
+    view.camera.max_theta = number(node_[max_theta_key], max_theta_key) * radians_per_degree;
   }
   return view;
 }

@@ -130,8 +130,9 @@ DeviceInfo cpu_device_info() {
   DeviceInfo info;
   info.kind = DeviceKind::cpu;
   info.id = "cpu";
-  info.name = "CPU reference, " + std::to_string(cv::getNumThreads()) + " threads";
+  info.name = "CPU reference";
   info.type = "cpu";
+  info.driver = std::to_string(cv::getNumThreads()) + " threads";
   return info;
 }
 

@@ -60,11 +60,12 @@ __global__ void export_pixel(ViewMemory view, CudaViewMaps maps, int height) {
   const float4 r = view.rays[index];
   const float4 checked = view.checks[index];
   const vec4 hypothesis(h.x, h.y, h.z, h.w);
-  const float distance = plane_distance(hypothesis, vec4(r.x, r.y, r.z, r.w));
-  if (maps.distance.data != nullptr) *at(maps.distance.data, maps.distance.pitch, x, y) = distance;
+  const vec4 ray(r.x, r.y, r.z, r.w);
+  if (maps.distance.data != nullptr) {
+    *at(maps.distance.data, maps.distance.pitch, x, y) = plane_distance(hypothesis, ray);
+  }
   if (maps.normals.data != nullptr) {
-    vec3 normal(0, 0, 0);
-    if (distance > 0) normal = plane_normal(hypothesis);
+    const vec3 normal = plane_normal(hypothesis, ray);
     float* xyz = at(maps.normals.data, maps.normals.pitch, x, y, 3);
     xyz[0] = normal.x;
     xyz[1] = normal.y;

@@ -22,7 +22,6 @@ namespace {
 
 constexpr std::array<double, 4> relative_thresholds = {0.005, 0.01, 0.02, 0.05};
 constexpr std::array<double, 3> pixel_thresholds = {0.5, 1, 2};
-constexpr uchar visible = 255;
 constexpr double right_pixels = 2;
 constexpr double not_projected = std::numeric_limits<double>::quiet_NaN();
 
@@ -145,7 +144,8 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
       sample.truth = static_cast<double>(gt);
       const Eigen::Vector3d ray = direction(ray_of_pixel);
       sample.theta = std::atan2(ray.head<2>().norm(), ray.z()) * degrees_per_radian;
-      sample.non_occluded = truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible;
+      sample.non_occluded =
+          truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible_label;
       if (!confidence.empty()) sample.confidence = confidence_at(confidence, x, y);
       Eigen::Vector2d expected;
       sample.in_source = source_view.in_image(sample.truth * ray, expected);

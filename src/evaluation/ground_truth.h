@@ -7,6 +7,9 @@
 
 namespace widestereo {
 
+/// In GroundTruth::occlusion, of what the source view sees.
+inline constexpr uchar visible_label = 255;
+
 /// Throws Error unless a distance map and what it is scored against are as GroundTruth documents
 /// them.
 void require_truth(const cv::Mat& distance, const GroundTruth& truth);

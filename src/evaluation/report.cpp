@@ -150,7 +150,8 @@ cv::Mat error_picture(const cv::Mat& distance, const GroundTruth& truth) {
         const double t = std::clamp(std::log10(std::max(relative, 1e-6) / 0.005), 0.0, 1.0);
         colour = {0, 200 * std::min(1.0, 2 - 2 * t), 255 * std::min(1.0, 2 * t)};
       }
-      if (!truth.occlusion.empty() && truth.occlusion.at<uchar>(y, x) != 255) colour *= 0.45;
+      if (!truth.occlusion.empty() && truth.occlusion.at<uchar>(y, x) != visible_label)
+        colour *= 0.45;
       picture.at<cv::Vec3b>(y, x) = colour;
     }
   }

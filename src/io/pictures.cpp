@@ -14,6 +14,7 @@
 #include "io/bgr8.h"
 #include "statistics/percentile.h"
 #include "text/formatted.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
 
@@ -24,23 +25,19 @@ const cv::Scalar no_value(48, 48, 48);
 const cv::Scalar paper_colour(255, 255, 255);
 const cv::Scalar ink(30, 30, 30);
 
-/// Names and colours (BGR) of the Reason bits, lowest bit first.
-struct ReasonStyle {
-  const char* name;
-  cv::Vec3b colour;
-};
-const std::array<ReasonStyle, 12> reason_styles = {{{"no ray", {48, 48, 48}},
-                                                    {"no overlap", {160, 90, 40}},
-                                                    {"no texture", {200, 200, 60}},
-                                                    {"high cost", {60, 60, 220}},
-                                                    {"inconsistent", {40, 150, 250}},
-                                                    {"unchecked", {190, 80, 190}},
-                                                    {"low parallax", {120, 220, 120}},
-                                                    {"tilt", {200, 150, 250}},
-                                                    {"ambiguous", {60, 200, 250}},
-                                                    {"speckle", {230, 80, 40}},
-                                                    {"filled", {150, 150, 150}},
-                                                    {"low confidence", {110, 110, 160}}}};
+/// Colours (BGR) of named_reasons.
+const std::array<cv::Vec3b, named_reasons.size()> reason_colours = {{{48, 48, 48},
+                                                                     {160, 90, 40},
+                                                                     {200, 200, 60},
+                                                                     {60, 60, 220},
+                                                                     {40, 150, 250},
+                                                                     {190, 80, 190},
+                                                                     {120, 220, 120},
+                                                                     {200, 150, 250},
+                                                                     {60, 200, 250},
+                                                                     {230, 80, 40},
+                                                                     {150, 150, 150},
+                                                                     {110, 110, 160}}};
 
 /// `share` in [0, 1] through a colour map; pixels where `valid` is 0 get the colour of no value.
 cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {
@@ -159,9 +156,9 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
   cv::Mat picture = to_bgr8(image);
   // The lowest bit that is set shows, but what was filled shows as that.
   const auto show = [&](std::size_t bit) {
-    picture.setTo(reason_styles[bit].colour, (reasons & (1 << bit)) != 0);
+    picture.setTo(reason_colours[bit], (reasons & (1 << bit)) != 0);
   };
-  for (std::size_t bit = reason_styles.size(); bit-- > 0;) show(bit);
+  for (std::size_t bit = named_reasons.size(); bit-- > 0;) show(bit);
   show(std::countr_zero(static_cast<unsigned>(reason_filled)));
   return picture;
 }
@@ -169,8 +166,8 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image) {
 cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
                       cv::Size size) {
   if (size.width < 1 || size.height < 1) {
-    throw Error("A picture of a cloud cannot have " + std::to_string(size.width) + "x" +
-                std::to_string(size.height) + " pixels; give one or more both ways.");
+    throw Error("A picture of a cloud cannot have " + size_text(size.width, size.height) +
+                " pixels; give one or more both ways.");
   }
   cv::Mat picture(size, CV_8UC3, no_value);
   cv::Mat_<float> nearest(size, std::numeric_limits<float>::max());
@@ -218,15 +215,15 @@ cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high) {
 cv::Mat with_reason_legend(const cv::Mat& picture) {
   const double scale = text_scale(picture);
   const int line = static_cast<int>(30 * scale);
-  const int count = static_cast<int>(reason_styles.size());
+  const int count = static_cast<int>(named_reasons.size());
   const int rows = (count + 3) / 4;
   cv::Mat result = with_strip(picture, (2 + 5 * rows) * line / 4);
   const int column = result.cols / 4;
   for (int i = 0; i < count; ++i) {
     const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
     const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
-    cv::rectangle(result, box, cv::Scalar(reason_styles[i].colour), cv::FILLED);
-    put_text(result, reason_styles[i].name, {at.x + line, at.y + line * 2 / 3}, scale * 0.7);
+    cv::rectangle(result, box, cv::Scalar(reason_colours[i]), cv::FILLED);
+    put_text(result, named_reasons[i].name, {at.x + line, at.y + line * 2 / 3}, scale * 0.7);
   }
   return result;
 }

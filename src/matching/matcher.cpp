@@ -58,11 +58,8 @@ void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& hypotheses, const cv::Mat_<cv:
       held[x] = hypothesis[x];
       cost[x] = hypothesis[x][3];
       distance[x] = kernel::plane_distance(to_vec4(hypothesis[x]), to_vec4(ray[x]));
-      normal[x] = {0, 0, 0};
-      if (distance[x] > 0) {
-        const kernel::vec3 n = kernel::plane_normal(to_vec4(hypothesis[x]));
-        normal[x] = {n.x, n.y, n.z};
-      }
+      const kernel::vec3 n = kernel::plane_normal(to_vec4(hypothesis[x]), to_vec4(ray[x]));
+      normal[x] = {n.x, n.y, n.z};
     }
   });
 }

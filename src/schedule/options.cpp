@@ -5,26 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "schedule/option_names.h"
 #include "text/json_text.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
-// In the enumerations' namespace, where the conversion is looked up.
-NLOHMANN_JSON_SERIALIZE_ENUM(PatchWarp, {{PatchWarp::exact, "exact"},
-                                         {PatchWarp::affine, "affine"},
-                                         {PatchWarp::quadratic, "quadratic"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(DistanceSampling, {{DistanceSampling::uniform, "uniform"},
-                                                {DistanceSampling::inverse, "inverse"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(PatchPattern, {{PatchPattern::dense, "dense"},
-                                            {PatchPattern::checkerboard, "checkerboard"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(Interpolation,
-                             {{Interpolation::linear, "linear"}, {Interpolation::cubic, "cubic"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(Filter, {{Filter::exact, "exact"}, {Filter::device, "device"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(SearchMethod,
-                             {{SearchMethod::random, "random"}, {SearchMethod::pyramid, "pyramid"}})
-NLOHMANN_JSON_SERIALIZE_ENUM(Propagation, {{Propagation::checkerboard, "checkerboard"},
-                                           {Propagation::raster, "raster"}})
-
 namespace {
 
 /// JSON has neither NaN nor infinity.
@@ -45,10 +30,10 @@ void require_between(Number value, std::type_identity_t<Number> low,
 }
 
 template <class Enumeration>
-void require_known(Enumeration value, const std::string& name) {
-  // JSON has the first one's name for what is none.
-  if (nlohmann::json(value).get<Enumeration>() == value) return;
-  throw Error("The option " + name + " is " + text(static_cast<int>(value)) +
+void require_known(Enumeration value, const EnumeratorNames<Enumeration>& names,
+                   const std::string& option) {
+  if (!name_of(value, names).empty()) return;
+  throw Error("The option " + option + " is " + text(static_cast<int>(value)) +
               ", which no enumerator has; choose one of those in widestereo/options.h.");
 }
 
@@ -97,14 +82,14 @@ void validate(const Options& o) {
                 "farthest one between " +
                 text(Options::least_distance) + " and " + text(Options::most_distance) + " m.");
   }
-  require_known(o.search, "search");
-  require_known(o.warp, "warp");
-  require_known(o.sampling, "sampling");
-  require_known(o.propagation, "propagation");
-  require_known(o.pattern, "pattern");
-  require_known(o.interpolation, "interpolation");
-  require_known(o.filter, "filter");
-  require_between(o.window_radius, 1, 15, "window radius");
+  require_known(o.search, search_names, "search");
+  require_known(o.warp, warp_names, "warp");
+  require_known(o.sampling, sampling_names, "sampling");
+  require_known(o.propagation, propagation_names, "propagation");
+  require_known(o.pattern, pattern_names, "pattern");
+  require_known(o.interpolation, interpolation_names, "interpolation");
+  require_known(o.filter, filter_names, "filter");
+  require_between(o.window_radius, 1, Options::largest_window_radius, "window radius");
   require_between(o.first_iterations, 1, 100000, "first iterations");
   require_between(o.second_iterations, 0, 100000, "second iterations");
   require_between(o.refinements, 0, 16, "refinements");
@@ -151,57 +136,58 @@ void validate(const Options& o) {
   require_between(o.fill_radius, 0, 10000, "fill radius");
 }
 
-std::string to_string(Filter filter) { return nlohmann::json(filter).get<std::string>(); }
+std::string to_string(Filter filter) { return name_of(filter, filter_names); }
 
 std::string to_json(const Options& o) {
-  const nlohmann::ordered_json json = {{"preset", o.preset},
-                                       {"min_distance", o.min_distance},
-                                       {"max_distance", o.max_distance},
-                                       {"seed", o.seed},
-                                       {"search", o.search},
-                                       {"window_radius", o.window_radius},
-                                       {"pattern", o.pattern},
-                                       {"weight_scale", o.weight_scale},
-                                       {"interpolation", o.interpolation},
-                                       {"filter", o.filter},
-                                       {"levels", o.levels},
-                                       {"sweep_steps", o.sweep_steps},
-                                       {"level_iterations", o.level_iterations},
-                                       {"level_regressions", o.level_regressions},
-                                       {"regression_radius", o.regression_radius},
-                                       {"regression_steps", o.regression_steps},
-                                       {"regression_scale", o.regression_scale},
-                                       {"regression_precision", o.regression_precision},
-                                       {"subpixel_match", o.subpixel_match},
-                                       {"vote_radius", o.vote_radius},
-                                       {"normal_vote", o.normal_vote},
-                                       {"repair_radius", o.repair_radius},
-                                       {"far_preference", o.far_preference},
-                                       {"step_pixels", o.step_pixels},
-                                       {"step_normal", o.step_normal},
-                                       {"source_planes", o.source_planes},
-                                       {"coarse_planes", o.coarse_planes},
-                                       {"alternate_strips", o.alternate_strips},
-                                       {"warp", o.warp},
-                                       {"sampling", o.sampling},
-                                       {"propagation", o.propagation},
-                                       {"first_iterations", o.first_iterations},
-                                       {"second_iterations", o.second_iterations},
-                                       {"refinements", o.refinements},
-                                       {"best_sources", o.best_sources},
-                                       {"warm_iterations", o.warm_iterations},
-                                       {"warm_regressions", o.warm_regressions},
-                                       {"min_texture", o.min_texture},
-                                       {"min_visible", o.min_visible},
-                                       {"consistency_relative", o.consistency_relative},
-                                       {"consistency_pixels", o.consistency_pixels},
-                                       {"max_cost", o.max_cost},
-                                       {"min_parallax", o.min_parallax},
-                                       {"max_tilt", o.max_tilt},
-                                       {"min_support", o.min_support},
-                                       {"min_confidence", o.min_confidence},
-                                       {"ambiguity_margin", o.ambiguity_margin},
-                                       {"fill_radius", o.fill_radius}};
+  const nlohmann::ordered_json json = {
+      {"preset", o.preset},
+      {"min_distance", o.min_distance},
+      {"max_distance", o.max_distance},
+      {"seed", o.seed},
+      {"search", name_of(o.search, search_names)},
+      {"window_radius", o.window_radius},
+      {"pattern", name_of(o.pattern, pattern_names)},
+      {"weight_scale", o.weight_scale},
+      {"interpolation", name_of(o.interpolation, interpolation_names)},
+      {"filter", name_of(o.filter, filter_names)},
+      {"levels", o.levels},
+      {"sweep_steps", o.sweep_steps},
+      {"level_iterations", o.level_iterations},
+      {"level_regressions", o.level_regressions},
+      {"regression_radius", o.regression_radius},
+      {"regression_steps", o.regression_steps},
+      {"regression_scale", o.regression_scale},
+      {"regression_precision", o.regression_precision},
+      {"subpixel_match", o.subpixel_match},
+      {"vote_radius", o.vote_radius},
+      {"normal_vote", o.normal_vote},
+      {"repair_radius", o.repair_radius},
+      {"far_preference", o.far_preference},
+      {"step_pixels", o.step_pixels},
+      {"step_normal", o.step_normal},
+      {"source_planes", o.source_planes},
+      {"coarse_planes", o.coarse_planes},
+      {"alternate_strips", o.alternate_strips},
+      {"warp", name_of(o.warp, warp_names)},
+      {"sampling", name_of(o.sampling, sampling_names)},
+      {"propagation", name_of(o.propagation, propagation_names)},
+      {"first_iterations", o.first_iterations},
+      {"second_iterations", o.second_iterations},
+      {"refinements", o.refinements},
+      {"best_sources", o.best_sources},
+      {"warm_iterations", o.warm_iterations},
+      {"warm_regressions", o.warm_regressions},
+      {"min_texture", o.min_texture},
+      {"min_visible", o.min_visible},
+      {"consistency_relative", o.consistency_relative},
+      {"consistency_pixels", o.consistency_pixels},
+      {"max_cost", o.max_cost},
+      {"min_parallax", o.min_parallax},
+      {"max_tilt", o.max_tilt},
+      {"min_support", o.min_support},
+      {"min_confidence", o.min_confidence},
+      {"ambiguity_margin", o.ambiguity_margin},
+      {"fill_radius", o.fill_radius}};
   return to_text(json);
 }
 

@@ -11,6 +11,7 @@
 #include "geometry/camera_parameters.h"
 #include "geometry/validation.h"
 #include "kernel/enumerations.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
 
@@ -103,8 +104,8 @@ constexpr unsigned source_planes = 1u << CANDIDATE_SOURCE_PLANE;
 void require_room_for_patches(const View& view, int window_radius) {
   const int least = 2 * window_radius + 2;
   if (std::min(view.camera.width, view.camera.height) >= least) return;
-  throw Error("The image of " + view.name + " has " + std::to_string(view.camera.width) + "x" +
-              std::to_string(view.camera.height) + " pixels; patches of radius " +
+  throw Error("The image of " + view.name + " has " +
+              size_text(view.camera.width, view.camera.height) + " pixels; patches of radius " +
               std::to_string(window_radius) + " need " + std::to_string(least) +
               " both ways: choose a smaller window radius.");
 }

@@ -2,6 +2,7 @@
 #include "vulkan/memory.h"
 
 #include "text/mebibytes.h"
+#include "text/size_text.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -76,8 +77,8 @@ void require_image_limits(const VulkanContext& context, VkFormat format, cv::Siz
   const VkImageFormatProperties limits = context.image_limits(format, usage);
   const auto refuse = [&](const std::string& limit, const std::string& offered) {
     throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " (" +
-                std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels, " +
-                std::to_string(layers) + " layers): its " + limit + " is " + offered +
+                size_text(size.width, size.height) + " pixels, " + std::to_string(layers) +
+                " layers): its " + limit + " is " + offered +
                 "; use smaller images or another device.");
   };
   if (size.width > static_cast<long long>(limits.maxExtent.width)) {

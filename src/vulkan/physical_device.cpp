@@ -7,6 +7,7 @@
 
 #include "kernel/host.h"
 #include "text/hexadecimal.h"
+#include "vulkan/formats.h"
 
 namespace widestereo {
 namespace {
@@ -56,7 +57,7 @@ bool has_format(const InstanceFunctions& vk, VkPhysicalDevice device, VkFormat f
 }  // namespace
 
 bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device) {
-  return has_format(vk, device, VK_FORMAT_R32_SFLOAT,
+  return has_format(vk, device, intensity_format,
                     VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
 }
 
@@ -67,7 +68,7 @@ bool has_extended_storage_formats(const InstanceFunctions& vk, VkPhysicalDevice 
 }
 
 bool filters_half_precision(const InstanceFunctions& vk, VkPhysicalDevice device) {
-  return has_format(vk, device, VK_FORMAT_R16_SFLOAT,
+  return has_format(vk, device, format_of_filtered_texels,
                     VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT |
                         VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT |
                         VK_FORMAT_FEATURE_TRANSFER_DST_BIT);
@@ -138,11 +139,11 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   if (!compute_queue_family(vk, device)) return "it has no compute queue; use another device.";
   const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
   if (in_software &&
-      !has_format(vk, device, VK_FORMAT_R32G32B32A32_SFLOAT,
+      !has_format(vk, device, format_of_loaded_texels,
                   VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
     return "it lacks storage images of four 32-bit floats; use another device.";
   }
-  if (!has_format(vk, device, VK_FORMAT_R32_SFLOAT,
+  if (!has_format(vk, device, intensity_format,
                   VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT |
                       VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
     return "it lacks sampled and storage images of 32-bit floats; use another device.";

@@ -6,17 +6,12 @@
 #include <cstring>
 #include <numeric>
 
+#include "vulkan/formats.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 namespace {
 
-constexpr VkFormat intensity_format = VK_FORMAT_R32_SFLOAT;
-constexpr VkFormat format_of_maps = VK_FORMAT_R32G32B32A32_SFLOAT;
-/// Texels of fewer bytes take texture units fewer cycles.
-constexpr VkFormat format_of_filtered_texels = VK_FORMAT_R16_SFLOAT;
-/// Without texture units: each with the neighbours that a bilinear sample reads.
-constexpr VkFormat format_of_loaded_texels = VK_FORMAT_R32G32B32A32_SFLOAT;
 constexpr std::size_t max_bands_per_submission = 256;
 constexpr VkPipelineStageFlags compute_and_transfer =
     VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;

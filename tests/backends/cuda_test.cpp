@@ -118,12 +118,14 @@ TEST(CudaMaps, DistancesAndNormalsOfPlanes) {
   const kernel::vec4 unit_ray(single(ray.x()), single(ray.y()), single(ray.z()), 1);
   kernel::vec4 plane(single(m.x()), single(m.y()), single(m.z()), 0.5f);
   EXPECT_NEAR(kernel::plane_distance(plane, unit_ray), distance, 1e-5);
-  const kernel::vec3 n = kernel::plane_normal(plane);
+  const kernel::vec3 n = kernel::plane_normal(plane, unit_ray);
   EXPECT_NEAR(n.x, normal.x(), 1e-6);
   EXPECT_NEAR(n.y, normal.y(), 1e-6);
   EXPECT_NEAR(n.z, normal.z(), 1e-6);
   plane.w = INVALID_COST;
   EXPECT_EQ(kernel::plane_distance(plane, unit_ray), 0);
+  const kernel::vec3 none = kernel::plane_normal(plane, unit_ray);
+  EXPECT_EQ(std::abs(none.x) + std::abs(none.y) + std::abs(none.z), 0);
   EXPECT_EQ(kernel::plane_distance({0, 0, 0, 0.5f}, unit_ray), 0);
   EXPECT_EQ(kernel::plane_distance({0, 0, -1, 0.5f}, unit_ray), 0);
 }

@@ -256,7 +256,11 @@ TEST_F(ReconstructCommand, ResultsOfImagesThatAreGoneAreRemoved) {
   ASSERT_EQ(run(reconstruct()).exit_code, 0);
   replace_in_model("model/images.txt", "right/1.png", "right/2.png");
   std::filesystem::rename(folder_ / "images/right/1.png", folder_ / "images/right/2.png");
-  ASSERT_EQ(run(reconstruct()).exit_code, 0);
+  const Outcome outcome = run(reconstruct());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("The results of 1 images that are not given now will be removed."),
+            std::string::npos)
+      << outcome.output;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/right/2.png/result.json"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/right/1.png"));
 }
@@ -333,6 +337,35 @@ TEST_F(ReconstructCommand, MasksAreOfEachImage) {
   EXPECT_EQ(record()["images"][0]["group"][1]["masked_pixels"], 48 * 96);
   cv::imwrite(file("masks/right/1.png.png"), cv::Mat(mask, cv::Rect(0, 0, 9, 9)));
   expect_error(reconstruct() + "--overwrite --masks " + file("masks"), "1.png.png");
+}
+
+TEST_F(ReconstructCommand, MasksOfImagesAddToThatOfAll) {
+  std::filesystem::create_directories(folder_ / "masks");
+  cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 20) = 0;
+  cv::imwrite(file("masks/left.png.png"), mask);
+  cv::flip(mask, mask, 1);
+  cv::imwrite(file("all.png"), mask);
+  const Outcome outcome =
+      run(reconstruct() + "--masks " + file("masks") + " --mask " + file("all.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(record()["images"][0]["group"][0]["masked_pixels"], 40 * 96);
+  EXPECT_EQ(record()["images"][0]["group"][1]["masked_pixels"], 20 * 96);
+}
+
+TEST_F(ReconstructCommand, ResultsDoNotTakeTheRunsOwnNames) {
+  for (const char* name : {"cloud_preview.png", "reconstruction.json/1.png"}) {
+    replace_in_model("model/images.txt", "right/1.png", name);
+    std::filesystem::create_directories((folder_ / "images" / name).parent_path());
+    std::filesystem::copy_file(folder_ / "images/right/1.png", folder_ / "images" / name);
+    const Outcome outcome = run(reconstruct());
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find("A result named " + std::string(name) + " would lie where the "),
+              std::string::npos)
+        << outcome.output;
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "out/left.png"));
+    replace_in_model("model/images.txt", name, "right/1.png");
+  }
 }
 
 TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {

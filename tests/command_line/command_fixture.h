@@ -133,6 +133,12 @@ class Command : public ::testing::Test {
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   /// Of a file in the folder, or of any by its whole path.
   std::string bytes_of(const std::string& name) const { return test::bytes_of(folder_ / name); }
+  /// The name of another file with the same content.
+  std::string copy_of(const std::string& name) const {
+    const std::string copy = "copy_of_" + name;
+    fs::copy_file(folder_ / name, folder_ / copy, fs::copy_options::overwrite_existing);
+    return copy;
+  }
   std::string depth_of(const std::string& left, const std::string& right,
                        const std::string& calibration = "calib.yaml") const {
     return "depth " + file(left) + " " + file(right) + " -c " + file(calibration) + " -o " +

@@ -214,6 +214,12 @@ TEST_F(Command, BadImagesAreNamed) {
                "--mask names 3 images for 2 views");
 }
 
+TEST_F(Command, ImagesThatAreGivenTwiceAreRefused) {
+  expect_error(depth_of("left.png", "left.png"), "left.png is given twice;");
+  fs::create_symlink("left.png", folder_ / "link.png");
+  expect_error(depth_of("left.png", "link.png"), "link.png is given twice;");
+}
+
 TEST_F(Command, BadCalibrationsAndOptionsAreNamed) {
   folder_.write("bad.yaml", "cam0: {camera_model: ocam}");
   expect_error(depth_of("left.png", "right.png", "bad.yaml"), "ocam");
@@ -300,6 +306,13 @@ TEST_F(RefusedWords, NamesAreListed) {
   const std::string help = run("sequence --help").output;
   EXPECT_NE(help.find("--warp TEXT:{exact,affine,quadratic}"), std::string::npos) << help;
   EXPECT_NE(help.find("--clouds "), std::string::npos) << help;
+}
+
+TEST_F(RefusedWords, TruthIsTrueOrFalse) {
+  const std::string depth = "depth none.png too.png -c " + file("calib.yaml") + " -o " +
+                            file("out") + " --subpixel-match ";
+  expect_refusal(depth + "maybe", "--subpixel-match: maybe is neither true nor false");
+  for (const char* word : {"true", "off", "1"}) expect_error(depth + word, "none.png");
 }
 
 TEST_F(RefusedWords, LimitsAreShort) {
@@ -433,7 +446,7 @@ TEST_F(FewerBits, AreStretchedByEveryCommand) {
     fs::copy_file(file("left16.png"), folder_ / "data" / camera / "0.png");
   }
   cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
-  const std::string pair = file("left16.png") + " " + file("left16.png") + " ";
+  const std::string pair = file("left16.png") + " " + file(copy_of("left16.png")) + " ";
   for (const std::string& command :
        {"sequence " + file("data") + " -o " + file("frames") + quick,
         "reconstruct " + file("data") + " --min-views 1 --count 1 -o " + file("dense") + quick,
@@ -514,8 +527,8 @@ TEST_F(Command, ImagesWithoutOverlapAreRefused) {
 TEST_F(Command, ViewsThatNoOtherOverlapsAreNamed) {
   write_calibration_looking_backwards();
   const Outcome outcome =
-      run("depth " + file("left.png") + " " + file("right.png") + " " + file("left.png") + " -c " +
-          file("backwards.yaml") + " -o " + file("out") + quick);
+      run("depth " + file("left.png") + " " + file("right.png") + " " + file(copy_of("left.png")) +
+          " -c " + file("backwards.yaml") + " -o " + file("out") + quick);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("No pixel of cam2 is seen by another view"), std::string::npos)
       << outcome.output;
@@ -567,7 +580,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
   expect_error("evaluate " + file("prediction.tiff") + " -c " + file("calib.yaml") + " --truth " +
                    file("normals.tiff"),
-               "The ground truth is CV_32FC3 instead of CV_32FC1;");
+               file("normals.tiff") + " has 3 value(s) a pixel, but a distance map has 1;");
   cv::imwrite(file("confidence.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
   const Outcome curve = run("evaluate " + file("prediction.tiff") + common +
                             " --json --confidence " + file("confidence.tiff"));
@@ -578,6 +591,15 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   expect_error(
       "evaluate " + file("prediction.tiff") + common + " --confidence " + file("none.tiff"),
       "none.tiff");
+  const std::string evaluate = "evaluate " + file("prediction.tiff") + common;
+  expect_error(evaluate + " --confidence " + file("normals.tiff"),
+               file("normals.tiff") + " has 3 value(s) a pixel, but a confidence map has 1;");
+  cv::imwrite(file("small.png"), cv::Mat(48, 96, CV_8UC1, cv::Scalar(255)));
+  for (const char* option : {" --valid ", " --occlusion ", " --image "}) {
+    expect_error(evaluate + option + file("small.png"),
+                 file("small.png") + " is 96x48 pixels, but ");
+  }
+  expect_error(evaluate + " --error-map " + file("error.none"), "error.none");
   // The right half has no ground truth.
   truth.colRange(48, 96).setTo(0);
   cv::imwrite(file("half_truth.tiff"), truth);
@@ -635,9 +657,12 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   EXPECT_EQ(run("calibration show " + file("calib.json")).exit_code, 0);
   expect_error("calibration show " + file("left.png"), "left.png");
   cv::imwrite(file("flat.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(7)));
-  expect_error("calibration check " + file("flat.png") + " " + file("flat.png") + " -c " +
+  expect_error("calibration check " + file("flat.png") + " " + file(copy_of("flat.png")) + " -c " +
                    file("calib.yaml"),
                "features match");
+  expect_error("calibration check " + file("flat.png") + " " + file("flat.png") + " -c " +
+                   file("calib.yaml"),
+               "flat.png is given twice; give another image for each view.");
   outcome = run("calibration check " + file("left.png") + " " + file("right.png") + " -c " +
                 file("calib.yaml") + " --json");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
@@ -702,7 +727,7 @@ TEST_F(Command, DarkRimsAreLeftOut) {
     return std::pair(views[1]["max_theta_degrees"].get<double>(),
                      outcome.output.find(" is black from ") != std::string::npos);
   };
-  const std::string depth = depth_of("rim.png", "rim.png", "unlimited.yaml");
+  const std::string depth = depth_of("rim.png", copy_of("rim.png"), "unlimited.yaml");
   const auto [found, told] = limits_of(depth);
   EXPECT_NEAR(found, 69, 2);  // 42 pixels, by the formula of the double sphere
   EXPECT_TRUE(told);
@@ -785,7 +810,7 @@ TEST_F(Command, SharperImageIsBlurred) {
   EXPECT_TRUE(same_bits(found, cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED)));
   EXPECT_EQ(blurs_of(depth_of("left.png", "blunt.png") + " --blur 0"), std::pair(0.0, 0.0));
   EXPECT_FALSE(same_bits(found, cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED)));
-  EXPECT_EQ(blurs_of(depth_of("left.png", "left.png")), std::pair(0.0, 0.0));
+  EXPECT_EQ(blurs_of(depth_of("left.png", copy_of("left.png"))), std::pair(0.0, 0.0));
   fs::remove_all(folder_ / "out");
   expect_error(depth_of("left.png", "blunt.png") + " --blur 1,2,3", "--blur was given 3 values");
   const Outcome check = run("calibration check " + file("blunt.png") + " " + file("left.png") +
@@ -936,9 +961,9 @@ TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
   EXPECT_GT(right_order["distance_p95"], right_order["distance_p50"]);
   cv::imwrite(file("small.png"), cv::Mat(9, 8, CV_8UC1, cv::Scalar(7)));
   expect_error(calibration("check", "left.png", "small.png"), "small.png is 8x9 pixels");
-  outcome = run(calibration("check", "left.png", "left.png"));
+  outcome = run(calibration("check", "left.png", copy_of("left.png")));
   EXPECT_NE(outcome.output.find("no feature is near enough"), std::string::npos) << outcome.output;
-  outcome = run(calibration("check", "left.png", "left.png") + "--json");
+  outcome = run(calibration("check", "left.png", copy_of("left.png")) + "--json");
   EXPECT_TRUE(nlohmann::json::parse(outcome.output)["distance_p5"].is_null()) << outcome.output;
 }
 

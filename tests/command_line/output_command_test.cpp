@@ -95,6 +95,8 @@ TEST_F(Output, GoesThroughLinksAndFifos) {
   Outcome outcome = run(convert + file("stdout") + " --to basalt");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("\"value0\""), std::string::npos) << outcome.output;
+  run(convert + "/dev/stdout --to basalt 2> /dev/null > " + file("piped.json") + "; true");
+  EXPECT_TRUE(nlohmann::json::accept(bytes_of("piped.json"))) << bytes_of("piped.json");
   folder_.write("target.json", "old");
   fs::create_symlink("target.json", folder_ / "link.json");
   outcome = run(convert + file("link.json") + " --to basalt");
@@ -218,7 +220,7 @@ TEST_F(Output, PicturesAreOfAnySize) {
     cv::imwrite(file("small.png"), image);
     write_small_calibration(size.width, size.height);
     fs::remove_all(folder_ / "out");
-    const Outcome outcome = run(depth_of("small.png", "small.png", "small.yaml"));
+    const Outcome outcome = run(depth_of("small.png", copy_of("small.png"), "small.yaml"));
     EXPECT_EQ(outcome.exit_code, 0) << size << "\n" << outcome.output;
     EXPECT_TRUE(fs::exists(folder_ / "out/summary1.png")) << size;
   }
@@ -241,6 +243,13 @@ TEST_F(Output, PngsMustHoldTheFarthestDistance) {
   EXPECT_EQ(run(depth + far + "--png-scale 100").exit_code, 0);
   fs::remove_all(folder_ / "out");
   EXPECT_EQ(run(depth + " --formats png --max-distance 65.535").exit_code, 0);
+}
+
+TEST_F(Output, PngsAreNotToBlameForARangeThatIsNone) {
+  for (const char* command : {"demo --size 64 --device cpu -o ", "demo --size 64 --panorama -o "}) {
+    expect_error(command + file("out") + " --formats png --min-distance -3 --max-distance -2",
+                 "The distance range from -3");
+  }
 }
 
 TEST_F(Output, PngsMustHoldTheNearestDistance) {

@@ -117,6 +117,14 @@ TEST_F(SequenceCommand, ResumesWithTheSameBits) {
   EXPECT_TRUE(fs::exists(folder_ / "parts/001/result.json"));
 }
 
+TEST_F(SequenceCommand, ResumesWithAnotherNumberOfThreads) {
+  ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
+  const std::string first = bytes_of("out/000/result.json");
+  const Outcome outcome = run(sequence() + "--count 2", "taskset -c 0 env");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(bytes_of("out/000/result.json") == first);
+}
+
 TEST_F(SequenceCommand, ImagesMayBeInFoldersOfAnyName) {
   ASSERT_EQ(run(sequence("standard")).exit_code, 0);
   fs::create_directories(folder_ / "data/right");

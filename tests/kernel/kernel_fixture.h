@@ -4,11 +4,11 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "cpu/kernels.h"
+#include "geometry/angle.h"
 #include "schedule/schedule.h"
 #include "widestereo/rig.h"
 #include "widestereo/synthesis.h"
@@ -20,10 +20,6 @@ inline Eigen::Vector3d to_eigen(const kernel::vec3& v) {
 }
 inline kernel::vec3 to_kernel(const Eigen::Vector3d& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
-
-inline double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / CV_PI;
 }
 
 /// TUM-VI-like double-sphere camera of `size` x `size` pixels that sees `max_theta` radians off
