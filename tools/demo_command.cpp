@@ -38,13 +38,13 @@ ws::RenderedPair render(const DemoArguments& arguments) {
 }
 
 void run_demo(DemoArguments arguments) {
-  const ws::RenderedPair pair = render(arguments);
   const auto [nearest, farthest] = ws::demo_distance_range();
   if (!arguments.settings.min_distance) arguments.settings.min_distance = nearest;
   if (!arguments.settings.max_distance) arguments.settings.max_distance = farthest;
   const ws::Options options = arguments.settings.options();
   arguments.format.require_room_for(options.min_distance, options.max_distance);
 
+  const ws::RenderedPair pair = render(arguments);
   std::vector<cv::Mat> images;
   std::vector<ws::GroundTruth> truths;
   for (const ws::RenderedView& view : pair.views) {
