@@ -18,8 +18,12 @@
 #define PER_CERTAIN_SLOPE 1.5e5f
 // Variance that any match may leave unexplained besides noise, of 1.4 grey levels.
 #define EXPECTED_VARIANCE 3e-5f
-// Displacement of the other view's own plane (px) that says half as much against a pixel's as any can.
+// Displacement of another plane (px) that says half as much against a pixel's as any can.
 #define HALF_DOUBTED_DISPLACEMENT 0.25f
+// The pixels beside a pixel, this far (px) to each side and along diagonals, whose surface it may belong to.
+#define BESIDE 3
+// Difference of intensity at which a surface beside is half as much like the pixel, of 10 grey levels.
+#define HALF_LIKE_DIFFERENCE 0.04f
 // Displacement (px) from an end of the range of distances at which a plane is half as suspect of lying beyond.
 #define HALF_SUSPECT_DISPLACEMENT 2.0f
 
@@ -134,15 +138,39 @@ FN float suspicion_at_ends(CONTEXT_ARGUMENT float w, float speed) {
   return max(beyond_far / (1.0f + to_far * to_far), beyond_near / (1.0f + to_near * to_near));
 }
 
+// From 0 up to 1 by the displacement (px) of another plane from the pixel's own.
+FN float doubt_of(float displacement) { return displacement / (displacement + HALF_DOUBTED_DISPLACEMENT); }
+
+// How suspect a plane at inverse distance w is of having spread from a nearer surface, 0 to 1: the surface beside the
+// pixel is farther and looks like it. `speed`: source pixels per unit of inverse distance.
+FN float suspicion_of_spread(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, float speed) {
+  float own = intensity_at(CONTEXT REFERENCE, pixel);
+  float suspicion = 0.0f;
+  ivec4 grid = grid_in_image(PARAMETERS.cameras[REFERENCE].size, pixel, ivec2(-BESIDE, -BESIDE), BESIDE,
+                             ivec2(BESIDE, BESIDE));
+  for (int dy = grid.y; dy <= grid.w; dy += BESIDE) {
+    for (int dx = grid.x; dx <= grid.z; dx += BESIDE) {
+      ivec2 beside = ivec2(pixel.x + dx, pixel.y + dy);
+      vec4 plane = hypothesis_at(CONTEXT REFERENCE, beside);
+      float unlike = abs(intensity_at(CONTEXT REFERENCE, beside) - own);
+      float farther = max(w - inverse_distance_of(plane, ray), 0.0f) * speed;
+      float suspect = doubt_of(farther) * (HALF_LIKE_DIFFERENCE / (HALF_LIKE_DIFFERENCE + unlike));
+      suspicion = max(suspicion, plane.w < INVALID_COST ? suspect : 0.0f);
+    }
+  }
+  return suspicion;
+}
+
 // What tells how likely a pixel's point is where its plane puts it.
 struct Indications {
+  float spread;        // suspicion_of_spread()
   float displacement;  // from the source's own plane (px)
   float support;       // of the surroundings
   float evidence;      // of the surroundings
   vec2 structure;      // structure_of_surroundings()
   float cost;          // 1 at most
   float noise_share;   // share_of_noise()
-  float suspicion;     // suspicion_at_ends()
+  float at_ends;       // suspicion_at_ends()
 };
 
 // Probability that the point lies within two source pixels of its true place: a logistic model, fitted to ray-traced
@@ -152,11 +180,10 @@ struct Indications {
 // alone. Where next to nothing matches, as in the dark beyond the lens circle, planes agree because nothing contradicts
 // them.
 FN float confidence_of(Indications i) {
-  float doubt = i.displacement / (i.displacement + HALF_DOUBTED_DISPLACEMENT);
-  float agreement = -(0.69f + 0.67f * i.structure.y) * logarithm(1.02f - i.support) * sqrt(i.noise_share);
+  float agreement = -(0.52f + 0.67f * i.structure.y) * logarithm(1.02f - i.support) * sqrt(i.noise_share);
   // Constants come first here, too.
-  float log_odds = i.structure.x * (4.03f * i.structure.y * i.evidence + agreement) - 1.91f * doubt -
-                   5.44f * i.suspicion * sqrt(i.cost) - 0.935f;
+  float log_odds = i.structure.x * (4.22f * i.structure.y * i.evidence + agreement) - 1.58f * doubt_of(i.displacement) -
+                   5.3f * i.at_ends * sqrt(i.cost) - 2.42f * i.spread - 0.2f;
   return min(EVIDENCE_SCALE * i.evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 
@@ -225,6 +252,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float confidence = 0.0f;
   if (compare_with_others(CONTEXT pixel, c)) {
     Indications i;
+    i.spread = suspicion_of_spread(CONTEXT pixel, c.ray, c.w, c.speed);
     i.displacement = c.difference.y >= UNKNOWN_DIFFERENCE ? UNCHECKED_DISPLACEMENT : c.difference.y;
     i.support = c.support.x;
     i.evidence = c.support.y;
@@ -232,7 +260,7 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     i.cost = min(c.held.w, 1.0f);
     i.noise_share =
         share_of_noise(i.cost, reference_variance(CONTEXT pixel), prior_at(CONTEXT REFERENCE, pixel).z);
-    i.suspicion = suspicion_at_ends(CONTEXT c.w, c.speed);
+    i.at_ends = suspicion_at_ends(CONTEXT c.w, c.speed);
     confidence = confidence_of(i);
     if (confidence < PARAMETERS.acceptance.x) c.reasons |= REASON_LOW_CONFIDENCE;
   }

@@ -273,7 +273,7 @@ TEST(Checks, AgreementWithoutEvidenceIsNotConfident) {
   EXPECT_GT(confidence_at_cost(0.1), 0.95);
   EXPECT_GT(confidence_at_cost(0.5), 0.6) << "enough to go by";
   EXPECT_LT(confidence_at_cost(0.5), 0.9) << "less than where all matches";
-  EXPECT_LT(confidence_at_cost(0.9), 0.2);
+  EXPECT_LT(confidence_at_cost(0.9), 0.25);
   EXPECT_EQ(confidence_at_cost(1.0), 0);
   EXPECT_EQ(confidence_at_cost(1.3), 0) << "nor do contrary patches speak for a plane";
 }
@@ -430,6 +430,35 @@ TEST(Checks, PlanesHeldAtAnEndOfTheRangeOfDistancesAreSuspect) {
     return fixture.view(0).checks(pixel.y, pixel.x)[2];
   };
   EXPECT_GT(at_infinity(0.01 * w), 0.94f * at_infinity(0)) << "nothing lies beyond";
+}
+
+TEST(Checks, APlaneBesideAFartherSurfaceThatLooksLikeItIsDoubted) {
+  const ivec2 pixel(48, 48);
+  /// Of being right, with planes scaled from that column on, and the pixels there, 3 px off, that
+  /// much brighter.
+  const auto odds = [&](float factor, int first_column, float brighter) {
+    AgreeingViews views(wide_range());
+    KernelFixture& fixture = views.fixture;
+    const vec3 m = factor * views.plane(0);
+    fixture.view(0)
+        .hypotheses.colRange(first_column, fixture.view(0).hypotheses.cols)
+        .setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
+    cv::Mat image = fixture.view(0).image();
+    for (int y = pixel.y - 3; y <= pixel.y + 3; y += 3) {
+      image.at<float>(y, pixel.x + 3) = image.at<float>(pixel.y, pixel.x) + brighter;
+    }
+    fixture.interpolate();
+    views.reasons(pixel);
+    const float confidence = fixture.view(0).checks(pixel.y, pixel.x)[2];
+    return confidence / (1 - confidence);
+  };
+  constexpr float farther = 0.8f;
+  constexpr float nearer = 1.25f;
+  const float doubted = odds(farther, pixel.x + 3, 0);
+  EXPECT_GT(odds(nearer, pixel.x + 3, 0), 3.5f * doubted) << "a nearer one beside";
+  EXPECT_GT(odds(farther, pixel.x + 3, 0.2f), 2.5f * doubted) << "another surface";
+  EXPECT_GT(odds(farther, pixel.x + 4, 0), 3.5f * doubted) << "out of reach";
+  EXPECT_GT(odds(0.99f, pixel.x + 3, 0), 1.5f * doubted) << "by less than a pixel";
 }
 
 TEST(Checks, ABetterMatchElsewhereIsAmbiguous) {
