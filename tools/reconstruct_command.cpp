@@ -208,12 +208,12 @@ class Reconstruction {
     }
     folders_.keep(kept);
     if (not_given > 0) {
-      say("The results of " + std::to_string(not_given) +
-          " images that are not given now will be removed.");
+      say("Images that are not given now: " + std::to_string(not_given) +
+          ". Their results will be removed.");
     }
     if (kept.empty()) return;
-    say(std::to_string(kept.size()) + " of " + std::to_string(wanted.size() - alone_in(groups_)) +
-        " images are kept as an earlier run matched them.");
+    say("Kept as an earlier run matched them: " + std::to_string(kept.size()) + " of " +
+        std::to_string(wanted.size() - alone_in(groups_)) + " images.");
   }
 
   void match(std::size_t number, ProgressBar& bar) {

@@ -258,7 +258,7 @@ TEST_F(ReconstructCommand, ResultsOfImagesThatAreGoneAreRemoved) {
   std::filesystem::rename(folder_ / "images/right/1.png", folder_ / "images/right/2.png");
   const Outcome outcome = run(reconstruct());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("The results of 1 images that are not given now will be removed."),
+  EXPECT_NE(outcome.output.find("Images that are not given now: 1. Their results will be removed."),
             std::string::npos)
       << outcome.output;
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out/right/2.png/result.json"));
@@ -276,7 +276,9 @@ TEST_F(ReconstructCommand, WhatIsGoneIsRemovedAlsoWhereNothingIsMatched) {
   folder_.write("out/.writing-1-0", "a killed run's");
   const Outcome outcome = run(reconstruct());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_NE(outcome.output.find("2 of 2 images are kept"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("Kept as an earlier run matched them: 2 of 2 images."),
+            std::string::npos)
+      << outcome.output;
   EXPECT_EQ(record()["images"].size(), 2U);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/gone"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/.writing-1-0"));
