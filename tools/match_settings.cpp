@@ -13,11 +13,10 @@ using widestereo::SearchMethod;
 
 namespace {
 
-/// Keeps the numbers of the finest levels; levels more are like the coarsest.
-void fit_to_levels(std::vector<int>& of_levels, int levels) {
-  const auto wanted = static_cast<std::size_t>(std::clamp(levels, 1, Options::most_levels));
-  while (of_levels.size() > wanted) of_levels.erase(of_levels.begin());
-  while (of_levels.size() < wanted) of_levels.insert(of_levels.begin(), of_levels.front());
+/// Keeps the numbers of the finest levels.
+void fit_to_levels(std::vector<int>& finest_last, int levels) {
+  const std::ptrdiff_t more = std::ssize(finest_last) - levels;
+  if (levels > 0 && more > 0) finest_last.erase(finest_last.begin(), finest_last.begin() + more);
 }
 
 }  // namespace
@@ -95,14 +94,15 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
       ->transform(name_among(widestereo::interpolation_names));
   add("--filter", &Options::filter, "Bilinear samples of those; device: by a GPU's texture units")
       ->transform(name_among(widestereo::filter_names));
-  add_pyramid("--levels", &Options::levels, "Levels of the image pyramid");
+  add_pyramid("--levels", &Options::levels,
+              "Levels of the image pyramid; 0 = by the size of the images");
   add_pyramid("--sweep-steps", &Options::sweep_steps,
               "Inverse distances tried at the coarsest level");
   add_pyramid("--level-iterations", &Options::level_iterations,
-              "Iterations of each level, coarsest first (by comma)")
+              "Iterations of each level, finest last, the first also of coarser ones (by comma)")
       ->delimiter(',');
   add_pyramid("--level-regressions", &Options::level_regressions,
-              "Plane regressions of each level, coarsest first (by comma)")
+              "Plane regressions of each level, likewise (by comma)")
       ->delimiter(',');
   add_pyramid("--regression-radius", &Options::regression_radius,
               "Radius of the plane regression, pixels");

@@ -231,6 +231,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
                       {"uuid", run.device.uuid}, {"bytes", run.result.device_bytes}};
   record["options"] = Json::parse(ws::to_json(run.options));
   record["filter_used"] = ws::to_string(run.result.filter);
+  record["levels_used"] = run.result.levels;
   record["milliseconds"] = run.result.milliseconds;
   for (const ws::KernelTime& time : run.result.times) {
     record["kernels"].push_back({{"kernel", time.kernel},

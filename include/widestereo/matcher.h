@@ -99,6 +99,7 @@ struct StereoResult {
   long long samples = 0;         ///< patch samples of the schedule at full windows (an upper bound)
   std::size_t device_bytes = 0;  ///< memory taken on the device
   Filter filter = Filter::exact;  ///< that was used: Options::filter where the device has it
+  int levels = 1;                 ///< of the image pyramid: Options::levels, or by size
 };
 
 /// `distance` with rejected pixels (reasons != 0) that were not filled set to 0. Throws Error where
@@ -127,7 +128,7 @@ class Matcher {
   /// Called between submissions with the share done in [0, 1]. What it throws ends the match.
   using Progress = std::function<void(double)>;
 
-  /// Views that a rig may have; with four levels (Options::levels) it is 12.
+  /// Views that a rig may have; with four levels (Options::levels) it is 12, with five 9.
   static constexpr int most_views = 15;
 
   /// Throws Error when the rig or the options are invalid or the device lacks memory or a feature.

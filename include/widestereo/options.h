@@ -61,7 +61,7 @@ std::string to_string(Filter filter);
 struct Options {
   /// What distances may be: the matcher squares them, and their inverses, in single precision.
   static constexpr double least_distance = 1e-6, most_distance = 1e9;
-  static constexpr int most_levels = 4;
+  static constexpr int most_levels = 8;
   static constexpr int largest_window_radius = 15;  ///< pixels
 
   std::string preset = "paper";
@@ -90,9 +90,14 @@ struct Options {
   Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid.
-  int levels = 3;        ///< each half the size of the finer one, 1..most_levels
+  /// Of the image pyramid, each half the size of the finer one, 1..most_levels; 0: as many as leave
+  /// each coarsest image at least 128 pixels wide and high, so that what lies amid a blank wall
+  /// comes near its edges in large images, too; in any case one for each number of the lists below,
+  /// and fewer for many views (Matcher::most_views).
+  int levels = 0;
   int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
-  /// Coarsest level first, one for each level, 0..1000.
+  /// Finest level last, 0..1000; the first number is that of all coarser levels, too. Not more than
+  /// levels.
   std::vector<int> level_iterations = {2, 2, 2};
   std::vector<int> level_regressions = {1, 2, 3};  ///< rounds of plane regression, likewise
   int regression_radius = 40;  ///< largest neighbourhood of a regressed plane, pixels, 2..64; of

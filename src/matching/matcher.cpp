@@ -178,6 +178,7 @@ class Matcher::Implementation {
     result.device_milliseconds = backend_->device_milliseconds();
     result.device_bytes = backend_->device_bytes();
     result.filter = static_cast<Filter>(schedule.constants.filter);
+    result.levels = static_cast<int>(schedule.views.size() / images.size());
     result.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return result;

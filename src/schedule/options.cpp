@@ -100,15 +100,16 @@ void validate(const Options& o) {
   }
   require_between(o.best_sources, 1, 8, "best sources");
   require_between(o.weight_scale, 0, 10000, "weight scale");
-  require_between(o.levels, 1, Options::most_levels, "levels");
+  require_between(o.levels, 0, Options::most_levels, "levels");
   require_between(o.sweep_steps, 1, 10000, "sweep steps");
   require_between(o.coarse_planes, 1, 4, "coarse planes");
   for (const auto& [values, name] : {std::pair(&o.level_iterations, "level iterations"),
                                      std::pair(&o.level_regressions, "level regressions")}) {
-    if (static_cast<int>(values->size()) != o.levels) {
+    const int most = o.levels > 0 ? o.levels : Options::most_levels;
+    if (values->empty() || values->size() > static_cast<std::size_t>(most)) {
       throw Error(std::string("The option ") + name + " has " + std::to_string(values->size()) +
-                  " numbers; give one for each of the " + std::to_string(o.levels) +
-                  " levels, coarsest first.");
+                  " numbers; give 1 to " + std::to_string(most) +
+                  ", that of the finest level last.");
     }
     for (const int value : *values) require_between(value, 0, 1000, name);
   }

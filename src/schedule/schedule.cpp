@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "geometry/angle.h"
 #include "geometry/camera_parameters.h"
@@ -88,6 +89,28 @@ std::vector<View> pyramid(const Rig& rig, int levels) {
   return views;
 }
 
+/// Of the pyramid (Options::levels).
+int levels_of(const Rig& rig, const Options& options) {
+  if (options.search != SearchMethod::pyramid) return 1;
+  if (options.levels > 0) return options.levels;
+  constexpr int least_side = 128;
+  int side = std::numeric_limits<int>::max();
+  for (const View& view : rig.views) {
+    side = std::min({side, view.camera.width, view.camera.height});
+  }
+  const int most = std::min(Options::most_levels, MAX_VIEWS / static_cast<int>(rig.views.size()));
+  auto levels =
+      static_cast<int>(std::max(options.level_iterations.size(), options.level_regressions.size()));
+  while (levels < most && side >> levels >= least_side) ++levels;
+  return levels;
+}
+
+/// The number that such a list has for a level, 0 being the finest.
+int of_level(const std::vector<int>& finest_last, int level) {
+  const auto finest = static_cast<int>(finest_last.size()) - 1;
+  return finest_last[static_cast<std::size_t>(std::max(finest - level, 0))];
+}
+
 // Candidates of shaders/adaptive_search.glsl.
 constexpr std::array<unsigned, 2> near_strips = {1u << STRIP_UP | 1u << STRIP_LEFT,
                                                  1u << STRIP_DOWN | 1u << STRIP_RIGHT};
@@ -122,8 +145,7 @@ struct Views {
 class Builder {
  public:
   Builder(const Rig& rig, const Options& options) : options_(options) {
-    const bool is_pyramid = options.search == SearchMethod::pyramid;
-    levels_ = is_pyramid ? options.levels : 1;
+    levels_ = levels_of(rig, options);
     require_few_enough(rig.views.size());
     views_of_rig_ = static_cast<int>(rig.views.size());
     schedule_.views = pyramid(rig, levels_);
@@ -220,17 +242,18 @@ class Builder {
       } else {
         add_between_levels(Kernel::upsample, level, level + 1, options_.coarse_planes);
       }
-      const int place = levels_ - 1 - level;
-      for (int i = 0; i < options_.level_iterations[place]; ++i) {
-        const bool last = level == 0 && i + 1 == options_.level_iterations[place];
+      const int iterations = of_level(options_.level_iterations, level);
+      for (int i = 0; i < iterations; ++i) {
+        const bool last = level == 0 && i + 1 == iterations;
         const unsigned candidates = cold_candidates(level == levels_ - 1, i, last);
         search(level, i, {candidates, candidates});
       }
-      for (int i = 0; i < options_.level_regressions[place]; ++i) {
+      const int regressions = of_level(options_.level_regressions, level);
+      for (int i = 0; i < regressions; ++i) {
         const Views views = views_of(level);
         measure(views);
         if (i == 0 && options_.subpixel_match) match_subpixel(views);
-        const bool last = i + 1 == options_.level_regressions[place];
+        const bool last = i + 1 == regressions;
         // Costs are not needed before the last round, those of before lie near enough.
         const Kernel adopt = level == 0 ? until_vote() : last ? Kernel::adopt : Kernel::adopt_point;
         regress(views, level == 0 ? round(i) : coarse_round(i),

@@ -15,9 +15,7 @@ namespace {
 using Eigen::Vector3d;
 using Pattern = synthesis::Paint::Pattern;
 
-constexpr int size = 256;
-
-RenderedPair render_blank_room() {
+RenderedPair render_blank_room(int size) {
   synthesis::Scene scene;
   scene.light = {0.5, -0.9, 1.5};
   scene.ambient = 0.3;
@@ -45,20 +43,28 @@ RenderedPair render_blank_room() {
   return pair;
 }
 
+ViewResult match(const RenderedPair& pair, Options options) {
+  options.min_distance = 0.4;
+  options.max_distance = 20;
+  Device device = Device::open("cpu");
+  return Matcher(device, pair.rig, options)
+      .match({pair.views[0].image, pair.views[1].image})
+      .views[0];
+}
+
+/// Of the pixels that are not occluded, the share that is wrong by more than `pixels`.
+double wrong_by(int pixels, const ViewResult& view, const RenderedPair& pair) {
+  const auto scores =
+      evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
+  return scores[1].bad_pixels.at(pixels);
+}
+
 TEST(BlankWalls, AreFoundFromTheirEdgesAndNotCertain) {
-  const RenderedPair pair = render_blank_room();
+  const RenderedPair pair = render_blank_room(256);
   for (const char* preset : {"fast", "quality"}) {
-    Options options = Options::preset_named(preset);
-    options.min_distance = 0.4;
-    options.max_distance = 20;
-    Device device = Device::open("cpu");
-    const ViewResult view = Matcher(device, pair.rig, options)
-                                .match({pair.views[0].image, pair.views[1].image})
-                                .views[0];
-    const auto scores =
-        evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
-    const double wrong = scores[1].bad_pixels.at(1);
-    const double right = 1 - scores[1].bad_pixels.at(2);
+    const ViewResult view = match(pair, Options::preset_named(preset));
+    const double wrong = wrong_by(1, view, pair);
+    const double right = 1 - wrong_by(2, view, pair);
     const double confidence = cv::mean(view.confidence, pair.views[0].truth.occlusion == 255)[0];
     const std::string name = preset;
     RecordProperty(name + "_wrong", std::to_string(wrong));
@@ -71,6 +77,18 @@ TEST(BlankWalls, AreFoundFromTheirEdgesAndNotCertain) {
     EXPECT_LT(confidence, right) << preset;
     EXPECT_GT(confidence, right - 0.1) << preset;
   }
+}
+
+TEST(BlankWalls, OfLargeImagesAreFoundByMoreLevels) {
+  const RenderedPair pair = render_blank_room(480);
+  Options options = Options::preset_named("fast");
+  options.levels = 4;
+  const double wrong = wrong_by(1, match(pair, options), pair);
+  options.levels = 3;
+  const double wrong_by_three = wrong_by(1, match(pair, options), pair);
+  RecordProperty("wrong", std::to_string(wrong));
+  RecordProperty("wrong_by_three", std::to_string(wrong_by_three));
+  EXPECT_LT(wrong, 0.9 * wrong_by_three);
 }
 
 }  // namespace

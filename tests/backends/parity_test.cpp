@@ -357,6 +357,7 @@ TEST_P(Parity, SixViewsOfTwoSizesGiveTheBitsOfTheCpu) {
   Options options = exact(Options::preset_named("fast"));
   options.min_distance = 0.5;
   options.max_distance = 8;
+  options.levels = 4;
   options.sweep_steps = 16;
   options.best_sources = 3;
   const StereoResult result = Matcher(*device, rig, options).match(images_of(rendered));

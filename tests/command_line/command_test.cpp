@@ -328,23 +328,27 @@ TEST_F(RefusedWords, LimitsAreShort) {
 }
 
 TEST_F(Command, LevelsKeepTheFinestOnesNumbers) {
-  const auto options_with = [this](const std::string& options) {
+  const auto record_with = [this](const std::string& options) {
     const Outcome outcome =
         run("depth " + file("left.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
             " -o " + file("out") + " --preset fast --device cpu --no-cloud --no-pictures --json" +
             " --min-distance 0.4 --max-distance 8 " + options);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-    return nlohmann::json::parse(outcome.output)["options"];
+    return nlohmann::json::parse(outcome.output);
   };
-  const nlohmann::json preset = options_with("");
-  const nlohmann::json one = options_with("--levels 1");
+  const nlohmann::json by_size = record_with("");
+  const nlohmann::json preset = by_size["options"];
+  EXPECT_EQ(preset["levels"], 0);
+  EXPECT_EQ(by_size["levels_used"], preset["level_iterations"].size()) << "small images";
+  const nlohmann::json one = record_with("--levels 1")["options"];
   for (const char* of_levels : {"level_iterations", "level_regressions"}) {
     EXPECT_EQ(one[of_levels], nlohmann::json::array({preset[of_levels].back()})) << of_levels;
   }
-  const nlohmann::json four = options_with("--levels 4 --level-iterations 1,1,1,2");
+  const nlohmann::json record_of_four = record_with("--levels 4 --level-iterations 1,1,1,2");
+  EXPECT_EQ(record_of_four["levels_used"], 4);
+  const nlohmann::json four = record_of_four["options"];
   EXPECT_EQ(four["level_iterations"], nlohmann::json({1, 1, 1, 2}));
-  EXPECT_EQ(four["level_regressions"].size(), 4u);
-  EXPECT_EQ(four["level_regressions"][0], preset["level_regressions"][0]);
+  EXPECT_EQ(four["level_regressions"], preset["level_regressions"]);
 }
 
 TEST_F(RefusedWords, OptionsHaveAnEffect) {
@@ -487,14 +491,14 @@ TEST_F(Command, RefusedRequestsLeaveNoFolder) {
                             file("calib.yaml") + " -o " + file("out") + " ";
   cv::imwrite(file("one.png"), cv::Mat(1, 1, CV_8UC3, cv::Scalar::all(7)));
   cv::imwrite(file("none.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
-  expect_error(depth + "--device cpu --level-iterations 1", "level iterations");
+  expect_error(depth + "--device cpu --levels 1 --level-iterations 1,2", "level iterations");
   expect_error(depth + "--device cpux", "cpux");
   expect_error("depth " + file("one.png") + " " + file("right.png") + " -c " + file("calib.yaml") +
                    " -o " + file("out") + " --device cpu",
                file("one.png") + " is 1x1 pixels");
   expect_error(depth + "--device cpu --mask " + file("none.png"),
                "The mask " + file("none.png") + " is 0 everywhere");
-  expect_error("demo --size 64 --device cpu --level-iterations 1 -o " + file("out"),
+  expect_error("demo --size 64 --device cpu --levels 1 --level-iterations 1,2 -o " + file("out"),
                "level iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }

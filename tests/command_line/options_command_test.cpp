@@ -108,10 +108,10 @@ TEST_F(OptionsOfDepth, OutOfRangeAreNamed) {
   for (const Wrong& wrong : {
            Wrong{"fast", "--window-radius", "16", "window radius is 16"},
            {"fast", "--weight-scale", "-0.5", "weight scale is -0.5"},
-           {"fast", "--levels", "5", "levels is 5"},
+           {"fast", "--levels", "9", "levels is 9"},
            {"fast", "--sweep-steps", "0", "sweep steps is 0"},
            {"fast", "--level-iterations", "1,2,1001", "level iterations is 1001"},
-           {"fast", "--level-regressions", "1,2", "level regressions has 2 numbers"},
+           {"fast", "--level-regressions", "1,1,1,1,1,1,1,1,1", "level regressions has 9 numbers"},
            {"fast", "--regression-radius", "1", "regression radius is 1"},
            {"fast", "--regression-steps", "17", "regression steps is 17"},
            {"fast", "--regression-scale", "0.05", "regression scale is 0.05"},

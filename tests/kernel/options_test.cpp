@@ -46,8 +46,8 @@ TEST(Options, RasterOrderBelongsToTheRandomSearch) {
 
 TEST(Options, WholeNumbersArePrintedAsSuch) {
   Options options;
-  options.levels = 0;
-  EXPECT_EQ(error_of_options(options), "The option levels is 0; it must lie between 1 and " +
+  options.levels = -1;
+  EXPECT_EQ(error_of_options(options), "The option levels is -1; it must lie between 0 and " +
                                            std::to_string(Options::most_levels) + ".");
 }
 
@@ -160,31 +160,26 @@ TEST(Options, DistancesAreARange) {
   }
 }
 
-TEST(Options, HaveANumberForEachLevel) {
+TEST(Options, HaveNumbersForLevels) {
   for (const auto& [list, name] : {std::pair(&Options::level_iterations, "level iterations"),
                                    {&Options::level_regressions, "level regressions"}}) {
-    const auto error = [list = list](std::vector<int> of_levels) {
+    const auto error = [list = list](std::vector<int> of_levels, int levels = 0) {
       Options options;
+      options.level_iterations = options.level_regressions = {1};
+      options.levels = levels;
       options.*list = std::move(of_levels);
       return error_of_options(options);
     };
     EXPECT_EQ(error({0, 1000, 1}), "");
+    EXPECT_EQ(error({0, 1000, 1}, 3), "");
+    EXPECT_EQ(error({1}, 3), "");
+    EXPECT_EQ(error(std::vector<int>(Options::most_levels, 1)), "");
     const std::string option = "The option " + std::string(name);
     EXPECT_THAT(error({1, -1, 1}), StartsWith(option + " is -1"));
     EXPECT_THAT(error({1, 1, 1001}), StartsWith(option + " is 1001"));
-    EXPECT_THAT(error({1, 1}), StartsWith(option + " has 2 numbers; give one for each of the 3"));
-  }
-  for (int levels = 0; levels <= 5; ++levels) {
-    Options options;
-    options.levels = levels;
-    options.level_iterations.assign(static_cast<std::size_t>(levels), 1);
-    options.level_regressions = options.level_iterations;
-    const std::string error = error_of_options(options);
-    if (levels >= 1 && levels <= 4) {
-      EXPECT_EQ(error, "");
-    } else {
-      EXPECT_THAT(error, StartsWith("The option levels is "));
-    }
+    EXPECT_THAT(error({1, 1, 1}, 2), StartsWith(option + " has 3 numbers; give 1 to 2, "));
+    EXPECT_THAT(error({}), StartsWith(option + " has 0 numbers; give 1 to 8, "));
+    EXPECT_THAT(error(std::vector<int>(9, 1)), StartsWith(option + " has 9 numbers; give 1 to 8"));
   }
 }
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 
 #include "error_of.h"
@@ -18,14 +19,67 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-Rig rig_of(std::size_t count) {
-  Rig rig = fisheye_rig(64);
+Rig rig_of(std::size_t count, int size = 64) {
+  Rig rig = fisheye_rig(size);
   while (rig.views.size() < count) {
     View view = rig.views.back();
     view.world_from_camera.translation().x() += 0.1;
     rig.views.push_back(view);
   }
   return rig;
+}
+
+int levels_of(const Rig& rig, const Options& options) {
+  return static_cast<int>(make_schedule(rig, options).views.size() / rig.views.size());
+}
+
+TEST(Levels, Leave128PixelsInTheSmallestImageUnlessListsAskForMore) {
+  Options options = Options::preset_named("fast");
+  const auto levels = [&options](int width, int height) {
+    Rig rig = fisheye_rig(2048);
+    rig.views[1].camera.width = width;
+    rig.views[1].camera.height = height;
+    return levels_of(rig, options);
+  };
+  EXPECT_EQ(levels(64, 64), 3);
+  EXPECT_EQ(levels(512, 512), 3);
+  EXPECT_EQ(levels(2048, 1023), 3);
+  EXPECT_EQ(levels(1280, 1024), 4);
+  EXPECT_EQ(levels(1024, 1280), 4);
+  EXPECT_EQ(levels(2048, 2048), 5);
+  options.level_iterations = {1};
+  options.level_regressions = {0, 1};
+  EXPECT_EQ(levels(64, 64), 2);
+  EXPECT_EQ(levels(1280, 1024), 4);
+  options.levels = 2;
+  EXPECT_EQ(levels(1280, 1024), 2);
+  options.levels = 5;
+  EXPECT_EQ(levels(64, 64), 5);
+  EXPECT_EQ(levels_of(fisheye_rig(512), Options::preset_named("paper")), 1);
+}
+
+TEST(Levels, AreFewerForManyViews) {
+  const Options options = Options::preset_named("fast");
+  for (const auto& [views, levels] : {std::pair(9, 5), {10, 4}, {12, 4}, {13, 3}, {15, 3}}) {
+    EXPECT_EQ(levels_of(rig_of(static_cast<std::size_t>(views), 2048), options), levels) << views;
+  }
+}
+
+TEST(Levels, TakeTheListsNumbersFromTheFinestOn) {
+  Options options = Options::preset_named("fast");
+  options.levels = 4;
+  options.level_iterations = {3, 1};
+  options.level_regressions = {2};
+  std::map<int, int> searches;
+  std::map<int, int> regressions;
+  for (const Dispatch& dispatch : make_schedule(rig_of(2), options).dispatches) {
+    const int level = dispatch.pass.first_view / 2;
+    if (dispatch.kernel == Kernel::search && dispatch.pass.colour == 0) ++searches[level];
+    // Those of normals alone, once more at the end, are not asked for precision.
+    if (dispatch.kernel == Kernel::regress && dispatch.pass.deviation > 0) ++regressions[level];
+  }
+  EXPECT_EQ(searches, (std::map<int, int>{{0, 1}, {1, 3}, {2, 3}, {3, 3}}));
+  EXPECT_EQ(regressions, (std::map<int, int>{{0, 2}, {1, 2}, {2, 2}, {3, 2}}));
 }
 
 TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
@@ -37,8 +91,6 @@ TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
   EXPECT_NE(error_of([&] { make_warm_schedule(rig_of(16), three_levels); }), "");
   Options four_levels = three_levels;
   four_levels.levels = 4;
-  four_levels.level_iterations.insert(four_levels.level_iterations.begin(), 1);
-  four_levels.level_regressions.insert(four_levels.level_regressions.begin(), 0);
   EXPECT_EQ(make_schedule(rig_of(12), four_levels).views.size(), 48u);
   EXPECT_THAT(error_of([&] { make_schedule(rig_of(13), four_levels); }),
               AllOf(HasSubstr("13 views, but 4 pyramid level(s) allow 12"),
