@@ -128,7 +128,7 @@ class Matcher {
   /// Called between submissions with the share done in [0, 1]. What it throws ends the match.
   using Progress = std::function<void(double)>;
 
-  /// Views that a rig may have; with four levels (Options::levels) it is 12, with five 9.
+  /// Views that a rig may have; where Options::levels asks for four levels it is 12, for five 9.
   static constexpr int most_views = 15;
 
   /// Throws Error when the rig or the options are invalid or the device lacks memory or a feature.

@@ -205,7 +205,7 @@ class Builder {
                 " pyramid level(s) allow " + std::to_string(most) + "; match fewer images" +
                 (images <= MAX_IMAGES
                      ? ", or choose " + std::to_string(MAX_VIEWS / static_cast<int>(images)) +
-                           " level(s) with as many level iterations and level regressions."
+                           " level(s) with no more level iterations and level regressions."
                      : "."));
   }
 

@@ -181,6 +181,17 @@ TEST(Options, HaveNumbersForLevels) {
     EXPECT_THAT(error({}), StartsWith(option + " has 0 numbers; give 1 to 8, "));
     EXPECT_THAT(error(std::vector<int>(9, 1)), StartsWith(option + " has 9 numbers; give 1 to 8"));
   }
+  for (int levels = -1; levels <= 9; ++levels) {
+    Options options;
+    options.levels = levels;
+    options.level_iterations = options.level_regressions = {1};
+    const std::string error = error_of_options(options);
+    if (levels >= 0 && levels <= 8) {
+      EXPECT_EQ(error, "");
+    } else {
+      EXPECT_THAT(error, StartsWith("The option levels is "));
+    }
+  }
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {
   EXPECT_EQ(make_schedule(rig_of(12), four_levels).views.size(), 48u);
   EXPECT_THAT(error_of([&] { make_schedule(rig_of(13), four_levels); }),
               AllOf(HasSubstr("13 views, but 4 pyramid level(s) allow 12"),
-                    HasSubstr("choose 3 level(s)")));
+                    HasSubstr("choose 3 level(s) with no more level iterations")));
   const Options one_level = Options::preset_named("paper");
   EXPECT_EQ(make_schedule(rig_of(15), one_level).views.size(), 15u);
   EXPECT_THAT(
