@@ -8,6 +8,12 @@
 #define VELOCITY_STEP 0.002f
 #define HALF_PER_VELOCITY_STEP 249.999985f
 
+// What is small and moves by more than its size is lost at coarse levels, and lies far from what was found there. A
+// random distance finds it: tried where the plane costs the first of these at least, and taken where it costs at most
+// the second times as much, for on a blank wall one of several is often a little better.
+#define DOUBTFUL_COST 0.25f
+#define OTHER_SURFACE_SHARE 0.4f
+
 // Movement in the source, pixels per unit of inverse distance; zero where it cannot be measured.
 FN vec2 source_velocity(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
@@ -127,7 +133,7 @@ FN vec3 adaptive_candidate(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, float
   vec4 range = PARAMETERS.range;
   vec4 u = draw4(CONTEXT pixel, kind);
   float w = dot(m, ray);
-  if (kind == CANDIDATE_RANDOM_DISTANCE) {
+  if (kind == CANDIDATE_RANDOM_DISTANCE || kind == CANDIDATE_OTHER_SURFACE) {
     return ((range.z + u.w * (range.w - range.z)) / w) * m;
   }
   vec3 plane = m;
@@ -154,10 +160,13 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float speed = length(velocity);
   for (uint kinds = PASS.candidates; kinds != 0u; kinds &= kinds - 1u) {
     int kind = lowest_bit(kinds);
+    bool of_other_surface = kind == CANDIDATE_OTHER_SURFACE;
+    if (of_other_surface && held.w < DOUBTFUL_COST) continue;
     vec3 m = vec3(held.x, held.y, held.z);
-    held = better_of(CONTEXT pixel, ray, held,
-                     adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind),
-                     1.0f / max(speed, 1e-6f));
+    vec4 better = better_of(CONTEXT pixel, ray, held,
+                            adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind),
+                            1.0f / max(speed, 1e-6f));
+    if (!of_other_surface || better.w <= OTHER_SURFACE_SHARE * held.w) held = better;
   }
   store_hypothesis(CONTEXT REFERENCE, pixel, held);
 }

@@ -85,6 +85,7 @@ FN int samples_of_patch(int radius, int pattern) {
 #define CANDIDATE_RANDOM_DISTANCE 11
 #define CANDIDATE_SURROUNDINGS 12
 #define CANDIDATE_SOURCE_PLANE 13
+#define CANDIDATE_OTHER_SURFACE 14
 
 // Bits of PassParameters.candidates of other kernels: see regress_plane(), adopt_pixel(),
 // and adopt_fill_pixel(), where it stands beside the reasons.

@@ -90,9 +90,9 @@ struct Options {
   Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid: the image pyramid's levels, each half the size of the finer one,
-  /// 1..most_levels; 0: as many as leave each coarsest image at least 128 pixels wide and high, so
-  /// that what lies amid a blank wall comes near its edges in large images, too; in any case one
-  /// for each number of the lists below, and fewer for many views (Matcher::most_views).
+  /// 1..most_levels; 0: as many as leave each coarsest image at least 40 pixels wide and high, so
+  /// that what lies amid a blank wall comes near its edges, however large the images; in any case
+  /// one for each number of the lists below, and fewer for many views (Matcher::most_views).
   int levels = 0;
   int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
   /// Finest level last, 0..1000; the first number is that of all coarser levels, too. Not more than

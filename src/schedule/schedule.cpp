@@ -93,7 +93,7 @@ std::vector<View> pyramid(const Rig& rig, int levels) {
 int levels_of(const Rig& rig, const Options& options) {
   if (options.search != SearchMethod::pyramid) return 1;
   if (options.levels > 0) return options.levels;
-  constexpr int least_side = 128;
+  constexpr int least_side = 40;
   int side = std::numeric_limits<int>::max();
   for (const View& view : rig.views) {
     side = std::min({side, view.camera.width, view.camera.height});
@@ -122,6 +122,7 @@ constexpr unsigned both = 1u << CANDIDATE_BOTH;
 constexpr unsigned random_distance = 1u << CANDIDATE_RANDOM_DISTANCE;
 constexpr unsigned surroundings = 1u << CANDIDATE_SURROUNDINGS;
 constexpr unsigned source_planes = 1u << CANDIDATE_SOURCE_PLANE;
+constexpr unsigned other_surfaces = 1u << CANDIDATE_OTHER_SURFACE;
 
 /// Smaller images leave pixels in their middle without planes: patches reach over both borders.
 void require_room_for_patches(const View& view, int window_radius) {
@@ -423,6 +424,8 @@ class Builder {
     }
     const bool first_of_all = coarsest && iteration == 0;
     if (first_of_all) candidates |= random_distance;
+    // What they find spreads from there on.
+    if (iteration == 0 && !coarsest && !last) candidates |= other_surfaces;
     // Earlier, on blank walls and periods, one view's errors would spread to the other and back.
     if (options_.source_planes && last && !first_of_all) candidates |= source_planes;
     return candidates;

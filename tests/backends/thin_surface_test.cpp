@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Poles of a few pixels before a wall: regression, repair and vote must leave what the search has
-// found of them, though nearly all that is around lies on the wall.
+// Poles and a ball of a few pixels before a wall: the search must find them, regression, repair and
+// vote must leave them, though nearly all that is around lies on the wall.
 #include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
 
 #include "synthesis/render.h"
 #include "widestereo/matcher.h"
@@ -66,6 +68,34 @@ TEST_P(ThinSurfaces, StayBeforeAWall) {
   ASSERT_GT(pixels, 500);
   RecordProperty("lost", std::to_string(static_cast<double>(lost) / pixels));
   EXPECT_LT(lost, 0.06 * pixels) << "of " << pixels;
+}
+
+/// A ball three pixels of the coarsest image wide, which moves by four of them.
+TEST(SmallNearSurfaces, AreFoundThoughTheCoarsestImageHidesThem) {
+  constexpr int side = 288;
+  constexpr double ball_distance = 0.33;
+  synthesis::Scene scene;
+  scene.light = {0.5, -2, 0};
+  const synthesis::Paint brick{{0.7, 0.6, 0.5}, {0.35, 0.3, 0.3}, Pattern::noise, 0.3, 1.2};
+  const synthesis::Paint cloth{{0.8, 0.3, 0.2}, {0.3, 0.6, 0.8}, Pattern::noise, 0.01, 1.2};
+  scene.surfaces.push_back(make_plane(brick, {0, 0, 1}, wall_z));
+  scene.surfaces.push_back(make_sphere(cloth, {0.05, 0.02, ball_distance}, 0.045));
+  const RenderedPair pair = render(scene, demo_rig(side), 1);
+  Options options = Options::preset_named("fast");
+  options.min_distance = 0.2;
+  options.max_distance = 20;
+  options.levels = 4;
+  Device device = Device::open("cpu");
+  const StereoResult result =
+      Matcher(device, pair.rig, options).match({pair.views[0].image, pair.views[1].image});
+  const GroundTruth& truth = pair.views[0].truth;
+  const cv::Mat on_ball = (truth.distance > 0) & (truth.distance < 2 * ball_distance);
+  const cv::Mat found = (result.views[0].distance < 2 * ball_distance) & on_ball;
+  const int pixels = cv::countNonZero(on_ball);
+  ASSERT_GT(pixels, 200);
+  RecordProperty("found",
+                 std::to_string(cv::countNonZero(found)) + " of " + std::to_string(pixels));
+  EXPECT_GT(cv::countNonZero(found), 0.7 * pixels) << "none without candidates of other surfaces";
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ int levels_of(const Rig& rig, const Options& options) {
   return static_cast<int>(make_schedule(rig, options).views.size() / rig.views.size());
 }
 
-TEST(Levels, Leave128PixelsInTheSmallestImageUnlessListsAskForMore) {
+TEST(Levels, Leave40PixelsInTheSmallestImageUnlessListsAskForMore) {
   Options options = Options::preset_named("fast");
   const auto levels = [&options](int width, int height) {
     Rig rig = fisheye_rig(2048);
@@ -42,15 +42,16 @@ TEST(Levels, Leave128PixelsInTheSmallestImageUnlessListsAskForMore) {
     return levels_of(rig, options);
   };
   EXPECT_EQ(levels(64, 64), 3);
-  EXPECT_EQ(levels(512, 512), 3);
-  EXPECT_EQ(levels(2048, 1023), 3);
-  EXPECT_EQ(levels(1280, 1024), 4);
-  EXPECT_EQ(levels(1024, 1280), 4);
-  EXPECT_EQ(levels(2048, 2048), 5);
+  EXPECT_EQ(levels(512, 319), 3);
+  EXPECT_EQ(levels(512, 320), 4);
+  EXPECT_EQ(levels(512, 512), 4);
+  EXPECT_EQ(levels(639, 640), 4);
+  EXPECT_EQ(levels(640, 640), 5);
+  EXPECT_EQ(levels(2048, 2048), 6);
   options.level_iterations = {1};
   options.level_regressions = {0, 1};
   EXPECT_EQ(levels(64, 64), 2);
-  EXPECT_EQ(levels(1280, 1024), 4);
+  EXPECT_EQ(levels(1280, 1024), 5);
   options.levels = 2;
   EXPECT_EQ(levels(1280, 1024), 2);
   options.levels = 5;
@@ -60,7 +61,8 @@ TEST(Levels, Leave128PixelsInTheSmallestImageUnlessListsAskForMore) {
 
 TEST(Levels, AreFewerForManyViews) {
   const Options options = Options::preset_named("fast");
-  for (const auto& [views, levels] : {std::pair(9, 5), {10, 4}, {12, 4}, {13, 3}, {15, 3}}) {
+  for (const auto& [views, levels] :
+       {std::pair(8, 6), {9, 5}, {10, 4}, {12, 4}, {13, 3}, {15, 3}}) {
     EXPECT_EQ(levels_of(rig_of(static_cast<std::size_t>(views), 2048), options), levels) << views;
   }
 }
@@ -80,6 +82,21 @@ TEST(Levels, TakeTheListsNumbersFromTheFinestOn) {
   }
   EXPECT_EQ(searches, (std::map<int, int>{{0, 1}, {1, 3}, {2, 3}, {3, 3}}));
   EXPECT_EQ(regressions, (std::map<int, int>{{0, 2}, {1, 2}, {2, 2}, {3, 2}}));
+}
+
+TEST(OtherSurfaces, AreLookedForOnceAtEveryLevelButTheCoarsest) {
+  std::map<int, int> searches;
+  for (const Dispatch& dispatch :
+       make_schedule(rig_of(2), Options::preset_named("fast")).dispatches) {
+    if (dispatch.kernel != Kernel::search || dispatch.pass.colour != 0) continue;
+    if ((dispatch.pass.candidates & 1u << CANDIDATE_OTHER_SURFACE) == 0) continue;
+    EXPECT_EQ(dispatch.pass.iteration, 1);
+    ++searches[dispatch.pass.first_view / 2];
+  }
+  const int levels = levels_of(rig_of(2), Options::preset_named("fast"));
+  EXPECT_EQ(searches.size(), static_cast<std::size_t>(levels - 1));
+  for (const auto& [level, times] : searches) EXPECT_EQ(times, 1) << level;
+  EXPECT_FALSE(searches.contains(levels - 1));
 }
 
 TEST(ViewLimit, CountsImagesAndTheViewsOfAllLevels) {

@@ -6,9 +6,11 @@
 #include <array>
 #include <optional>
 #include <set>
+#include <vector>
 
 #include "kernel_fixture.h"
 #include "same_bits.h"
+#include "synthesis/render.h"
 
 namespace widestereo::test {
 namespace {
@@ -133,9 +135,11 @@ TEST_F(Candidates, AreDrawnFromAroundWhatIsHeldToEitherSide) {
       const Eigen::Vector3d distance = drawn(CANDIDATE_INVERSE_DISTANCE);
       moved.add((distance - held).dot(r) * speed);
       EXPECT_LT(distance.normalized().cross(held.normalized()).norm(), 1e-5);
-      const Eigen::Vector3d random = drawn(CANDIDATE_RANDOM_DISTANCE);
-      anywhere.add((random.dot(r) - least) / (most - least));
-      EXPECT_LT(random.normalized().cross(held.normalized()).norm(), 1e-5);
+      for (const int kind : {CANDIDATE_RANDOM_DISTANCE, CANDIDATE_OTHER_SURFACE}) {
+        const Eigen::Vector3d random = drawn(kind);
+        anywhere.add((random.dot(r) - least) / (most - least));
+        EXPECT_LT(random.normalized().cross(held.normalized()).norm(), 1e-5);
+      }
       const Eigen::Vector3d normal = drawn(CANDIDATE_NORMAL);
       EXPECT_NEAR(normal.dot(r), held.dot(r), 1e-5);
       // Scaled so that what was added to the unit normal shows, but for its part along the normal.
@@ -158,6 +162,43 @@ TEST_F(Candidates, AreDrawnFromAroundWhatIsHeldToEitherSide) {
     EXPECT_GT(axis.high, 0.9 * turn);
     EXPECT_LT(axis.high, 1.6 * turn);
   }
+}
+
+/// Costs of the planes that pixels before a wall take from such candidates; all held another one.
+std::vector<float> taken_costs(int kind, float held_cost) {
+  const Rig rig = fisheye_rig(size);
+  synthesis::Scene scene;
+  const synthesis::Paint paint{
+      {0.8, 0.8, 0.8}, {0.2, 0.2, 0.2}, synthesis::Paint::Pattern::noise, 0.15, 1.2};
+  scene.surfaces.push_back(make_plane(paint, {0, 0, 1}, 1));
+  KernelFixture fixture(rig, wide_range("fast"));
+  fixture.show(render(scene, rig, 4));
+  fixture.set_reference(0);
+  fixture.pass().candidates = 1u << kind;
+  std::vector<float> costs;
+  for (int y = 30; y < 66; ++y) {
+    for (int x = 30; x < 66; ++x) {
+      const vec3 held = to_kernel(0.2 * fixture.ray(0, {x, y}));
+      fixture.view(0).hypotheses(y, x) = cv::Vec4f(held.x, held.y, held.z, held_cost);
+      kernel::cpu::search_pixel(fixture.context(), {x, y});
+      const cv::Vec4f taken = fixture.view(0).hypotheses(y, x);
+      if (taken[0] != held.x || taken[1] != held.y || taken[2] != held.z) costs.push_back(taken[3]);
+    }
+  }
+  return costs;
+}
+
+TEST(OtherSurfaces, ReplaceWhatHardlyMatchesByWhatMatchesMuchBetter) {
+  for (const float held : {0.3f, 0.6f}) {
+    const std::vector<float> costs = taken_costs(CANDIDATE_OTHER_SURFACE, held);
+    const std::vector<float> better = taken_costs(CANDIDATE_RANDOM_DISTANCE, held);
+    EXPECT_GT(costs.size(), 20u) << held;
+    EXPECT_LT(costs.size(), better.size()) << held;
+    for (const float cost : costs) EXPECT_LE(cost, 0.4f * held);
+    EXPECT_GT(std::ranges::max(better), 0.4f * held);
+  }
+  EXPECT_EQ(taken_costs(CANDIDATE_OTHER_SURFACE, 0.24f), std::vector<float>());
+  EXPECT_NE(taken_costs(CANDIDATE_RANDOM_DISTANCE, 0.24f), std::vector<float>());
 }
 
 /// The planes of `iterations` of the paper's search, all of which start with such checks.
