@@ -9,7 +9,6 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <set>
@@ -19,6 +18,7 @@
 #include "damaged_texts.h"
 #include "data_folder.h"
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "geometry/named_cameras.h"
 #include "replaced.h"
 #include "temporary_folder.h"
@@ -144,7 +144,7 @@ TEST(Kalibr, ReadsModelsPosesAndTheFieldOfView) {
   EXPECT_EQ(ds.xi, -0.17);
   EXPECT_EQ(ds.alpha, 0.59);
   EXPECT_EQ(ds.height, 480);
-  EXPECT_NEAR(ds.max_theta, 97.5 * std::numbers::pi / 180, 1e-15);
+  EXPECT_NEAR(ds.max_theta, 97.5 * radians_per_degree, 1e-15);
   // T_cn_cnm1 takes points of camera 0 to camera 1.
   const Eigen::Vector3d moved =
       source_from_reference(c.rig.views[1], c.rig.views[0]) * Eigen::Vector3d(0, 0, 1);

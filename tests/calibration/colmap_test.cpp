@@ -7,6 +7,7 @@
 
 #include "comma_locale.h"
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
 #include "widestereo/sfm_model.h"
@@ -121,7 +122,7 @@ TEST_F(Colmap, ProjectsWorldPointsLikeOpenCv) {
   const View view = read().rig.views.front();
   const cv::Matx33d k(200, 0, 320, 0, 201, 239.75, 0, 0, 1);
   // 10 degrees about x, and then the translation.
-  const cv::Vec3d rotation(10 * CV_PI / 180, 0, 0), translation(0.5, -0.25, 2);
+  const cv::Vec3d rotation(10 * radians_per_degree, 0, 0), translation(0.5, -0.25, 2);
   const std::vector<cv::Point3d> points = {{0, 0, 1}, {1, -2, 0.5}, {-3, 1, 2}, {4, 4, 1}};
   std::vector<cv::Point2d> expected;
   cv::fisheye::projectPoints(points, expected, rotation, translation, k,

@@ -11,6 +11,7 @@
 
 #include "data_folder.h"
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -33,7 +34,7 @@ Rig rig_with_rotation_error(double degrees) {
   }
   rig.views[1].world_from_camera =
       Eigen::Translation3d(0.1, 0, 0) *
-      Eigen::AngleAxisd(degrees * 3.14159265358979 / 180, Eigen::Vector3d::UnitX());
+      Eigen::AngleAxisd(degrees * radians_per_degree, Eigen::Vector3d::UnitX());
   return rig;
 }
 

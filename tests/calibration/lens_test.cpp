@@ -5,12 +5,12 @@
 
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "data_folder.h"
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -18,7 +18,7 @@
 namespace widestereo {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+constexpr double degree = radians_per_degree;
 
 Camera fisheye() {
   Camera camera;

@@ -12,6 +12,7 @@
 
 #include "damaged_texts.h"
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "replaced.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
@@ -25,7 +26,7 @@ using test::replaced;
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
 
-constexpr double degree = std::numbers::pi / 180;
+constexpr double degree = radians_per_degree;
 
 /// Of OmniMVS's lens of 220 degrees, with a pixel's row before its column as in all of OCamCalib.
 constexpr std::array<double, 5> polynomial = {-392.22, 0, 1.2707685e-3, -1.7456027e-6,

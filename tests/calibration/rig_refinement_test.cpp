@@ -16,7 +16,7 @@
 namespace widestereo {
 namespace {
 
-constexpr double radians = std::numbers::pi / 180;
+constexpr double radians = radians_per_degree;
 
 Eigen::AngleAxisd turned(double degrees, const Eigen::Vector3d& axis) {
   return Eigen::AngleAxisd(degrees * radians, axis.normalized());

@@ -7,6 +7,7 @@
 
 #include "command_fixture.h"
 #include "data_folder.h"
+#include "geometry/angle.h"
 #include "replaced.h"
 #include "same_bits.h"
 #include "widestereo/calibration.h"
@@ -696,14 +697,14 @@ cam1:
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const nlohmann::json shown = nlohmann::json::parse(outcome.output);
   const nlohmann::json& view = shown["views"][0];
-  const auto degrees = [](double tangent) { return 2 * std::atan(tangent) * 180 / M_PI; };
+  const auto degrees = [](double tangent) { return 2 * std::atan(tangent) * degrees_per_radian; };
   EXPECT_NEAR(view["horizontal_field_of_view_degrees"], degrees(150 / 50.), 1e-6);
   EXPECT_NEAR(view["vertical_field_of_view_degrees"], degrees(50 / 50.), 1e-6);
   EXPECT_NEAR(view["diagonal_field_of_view_degrees"], degrees(std::hypot(150, 50) / 50), 0.5);
   // Of a sensor that was cut off below the principal point.
   const nlohmann::json& cut = shown["views"][1];
   EXPECT_NEAR(cut["vertical_field_of_view_degrees"],
-              (std::atan(120 / 50.) - std::atan(20 / 50.)) * 180 / M_PI, 1e-6);
+              (std::atan(120 / 50.) - std::atan(20 / 50.)) * degrees_per_radian, 1e-6);
   EXPECT_GT(cut["horizontal_field_of_view_degrees"], 90);
   const nlohmann::json& pair = shown["pairs"][0];
   EXPECT_NEAR(pair["baseline_metres"], 0.1, 1e-12);
@@ -852,7 +853,8 @@ TEST_F(Command, CalibrationIsRefined) {
   EXPECT_NE(verdict("refined.json").find("calibration: good\n"), std::string::npos);
   ASSERT_EQ(run(refine + " -o " + file("limited.yaml") + " --max-theta 60").exit_code, 0);
   const Rig limited = read_calibration(file("limited.yaml")).rig;
-  EXPECT_NEAR(limited.views[0].camera.max_theta, 97.5 * CV_PI / 180, 1e-9) << "as calibrated";
+  EXPECT_NEAR(limited.views[0].camera.max_theta, 97.5 * radians_per_degree, 1e-9)
+      << "as calibrated";
   EXPECT_NEAR(limited.views[1].camera.max_theta, CV_PI, 1e-9) << "likewise";
   EXPECT_EQ(verdict("turned.yaml").find("calibration: good"), std::string::npos);
   // Turned by twelve degrees.

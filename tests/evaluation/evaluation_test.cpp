@@ -14,6 +14,7 @@
 
 #include "comma_locale.h"
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "widestereo/error.h"
 #include "widestereo/synthesis.h"
 
@@ -103,8 +104,8 @@ TEST_F(FourPixels, MediansOfAnEvenNumberAreBetweenTheMiddleTwo) {
 
 TEST_F(FourPixels, MissingNormalsDoNotCount) {
   const auto tilted = [](double degrees) {
-    return cv::Vec3f(static_cast<float>(std::sin(degrees * M_PI / 180)), 0,
-                     static_cast<float>(-std::cos(degrees * M_PI / 180)));
+    return cv::Vec3f(static_cast<float>(std::sin(degrees * radians_per_degree)), 0,
+                     static_cast<float>(-std::cos(degrees * radians_per_degree)));
   };
   truth_.normals = cv::Mat(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
   cv::Mat normals = cv::Mat::zeros(2, 4, CV_32FC3);
@@ -156,7 +157,7 @@ TEST_F(FourPixels, OcclusionAndNormalsCount) {
   truth_.occlusion = (cv::Mat_<uchar>(2, 4) << 255, 0, 128, 255, 255, 255, 255, 255);
   truth_.normals = cv::Mat(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
   cv::Mat normals(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
-  const double angle = 30 * M_PI / 180;
+  const double angle = 30 * radians_per_degree;
   normals.at<cv::Vec3f>(0, 3) = {static_cast<float>(std::sin(angle)), 0,
                                  static_cast<float>(-std::cos(angle))};
   const std::vector<RegionScores> scores =
@@ -249,7 +250,7 @@ class TexturedScene : public ::testing::Test {
     for (int x = 21; x < columns; x += 2) truth_.image.col(x).setTo(12);
   }
   static cv::Scalar tilted(double degrees) {
-    return {std::sin(degrees * M_PI / 180), 0, -std::cos(degrees * M_PI / 180)};
+    return {std::sin(degrees * radians_per_degree), 0, -std::cos(degrees * radians_per_degree)};
   }
   const RegionScores& textured(const cv::Mat& normals) {
     scores_ = evaluate(truth_.distance, normals, truth_, reference_, source_);

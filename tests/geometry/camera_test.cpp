@@ -12,6 +12,7 @@
 #include <set>
 
 #include "error_of.h"
+#include "geometry/angle.h"
 #include "geometry/camera_parameters.h"
 #include "geometry/named_cameras.h"
 #include "widestereo/error.h"
@@ -24,7 +25,7 @@ using Eigen::Vector3d;
 using test::cameras;
 using test::make_camera;
 using test::NamedCamera;
-constexpr double degree = std::numbers::pi / 180;
+constexpr double degree = radians_per_degree;
 
 Vector3d direction(double theta, double azimuth) {
   return {std::sin(theta) * std::cos(azimuth), std::sin(theta) * std::sin(azimuth),

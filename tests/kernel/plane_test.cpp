@@ -5,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "geometry/angle.h"
 #include "kernel_fixture.h"
 
 namespace widestereo::test {
@@ -85,7 +86,8 @@ TEST(Search, DrawsStayAdmissible) {
         const vec3 drawn = kernel::cpu::random_plane(fixture.context(), ivec2(x, y), ray, 0);
         ASSERT_TRUE(kernel::cpu::admissible(fixture.context(), ray, drawn));
         const double w = static_cast<double>(dot(drawn, ray));
-        ASSERT_GT(w / to_eigen(drawn).norm(), std::cos((options.max_tilt + 0.01) * CV_PI / 180));
+        ASSERT_GT(w / to_eigen(drawn).norm(),
+                  std::cos((options.max_tilt + 0.01) * radians_per_degree));
         mean_distance += 1 / w;
         mean_inverse += w;
         ++n;

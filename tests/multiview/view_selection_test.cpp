@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <set>
 
 #include "error_of.h"
+#include "geometry/angle.h"
 
 namespace widestereo {
 namespace {
@@ -25,7 +25,7 @@ View view_at(double x, double degrees = 0) {
   view.camera.cx = view.camera.cy = 50;
   view.world_from_camera =
       Eigen::Translation3d(x, 0, 0) *
-      Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitY());
+      Eigen::AngleAxisd(degrees * radians_per_degree, Eigen::Vector3d::UnitY());
   return view;
 }
 
