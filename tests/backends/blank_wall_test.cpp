@@ -6,8 +6,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "match_fixture.h"
 #include "synthesis/render.h"
-#include "widestereo/matcher.h"
 
 namespace widestereo::test {
 namespace {
@@ -43,13 +43,8 @@ RenderedPair render_blank_room(int size) {
   return pair;
 }
 
-ViewResult match(const RenderedPair& pair, Options options) {
-  options.min_distance = 0.4;
-  options.max_distance = 20;
-  Device device = Device::open("cpu");
-  return Matcher(device, pair.rig, options)
-      .match({pair.views[0].image, pair.views[1].image})
-      .views[0];
+ViewResult match(const RenderedPair& pair, const Options& options) {
+  return match_on_cpu(pair, options, 0.4, 20);
 }
 
 /// Of the pixels that are not occluded, the share that is wrong by more than `pixels`.

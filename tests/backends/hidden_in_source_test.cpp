@@ -2,8 +2,8 @@
 // A box before a wall, seen by three cameras: what it hides in one source is seen in the other.
 #include <gtest/gtest.h>
 
+#include "match_fixture.h"
 #include "synthesis/render.h"
-#include "widestereo/matcher.h"
 
 namespace widestereo::test {
 namespace {
@@ -47,14 +47,8 @@ INSTANTIATE_TEST_SUITE_P(Sides, HiddenInOneSource, ::testing::Bool());
 
 TEST_P(HiddenInOneSource, IsMatchedInTheOther) {
   const double side = GetParam() ? 1 : -1;
-  RenderedPair scene = render_box(rig_between(0.12 * side, -0.1 * side));
-  Options options = Options::preset_named("fast");
-  options.min_distance = 0.5;
-  options.max_distance = 20;
-  Device device = Device::open("cpu");
-  Matcher matcher(device, scene.rig, options);
-  const StereoResult result =
-      matcher.match({scene.views[0].image, scene.views[1].image, scene.views[2].image});
+  const RenderedPair scene = render_box(rig_between(0.12 * side, -0.1 * side));
+  const ViewResult found = match_on_cpu(scene, Options::preset_named("fast"), 0.5, 20);
 
   const GroundTruth& truth = scene.views[0].truth;
   int pixels = 0;
@@ -68,7 +62,7 @@ TEST_P(HiddenInOneSource, IsMatchedInTheOther) {
           std::min(truth.distance.at<float>(y, x - 1), truth.distance.at<float>(y, x + 1));
       if (nearest < 0.9F * distance) continue;
       ++pixels;
-      wrong += std::abs(result.views[0].distance.at<float>(y, x) / distance - 1) > 0.1F ? 1 : 0;
+      wrong += std::abs(found.distance.at<float>(y, x) / distance - 1) > 0.1F ? 1 : 0;
     }
   }
   ASSERT_GT(pixels, 100) << "hidden in the first source";

@@ -19,6 +19,15 @@ inline std::vector<cv::Mat> images_of(const RenderedPair& pair) {
   return images;
 }
 
+/// Camera 0's maps by the CPU, looked for between these distances (metres).
+inline ViewResult match_on_cpu(const RenderedPair& pair, Options options, double nearest,
+                               double farthest) {
+  options.min_distance = nearest;
+  options.max_distance = farthest;
+  Device device = Device::open("cpu");
+  return Matcher(device, pair.rig, options).match(images_of(pair)).views[0];
+}
+
 /// Camera 0 to world after steps of 5 cm and two degrees.
 inline Eigen::Isometry3d pose_after(double steps) {
   return Eigen::Translation3d(0.05 * steps, -0.01 * steps, 0.02 * steps) *

@@ -5,8 +5,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "match_fixture.h"
 #include "synthesis/render.h"
-#include "widestereo/matcher.h"
 
 namespace widestereo::test {
 namespace {
@@ -18,14 +18,20 @@ constexpr int size = 192;
 constexpr double wall_z = 3;  // metres
 constexpr double pole_z = 1.5;
 
-/// Poles, about five pixels wide, whose points are displaced by two pixels from those of the wall
-/// behind.
-RenderedPair render_poles() {
+/// A textured wall alone.
+synthesis::Scene wall() {
   synthesis::Scene scene;
   scene.light = {0.5, -2, 0};
   const synthesis::Paint brick{{0.7, 0.6, 0.5}, {0.35, 0.3, 0.3}, Pattern::noise, 0.3, 1.2};
-  const synthesis::Paint wood{{0.75, 0.7, 0.6}, {0.6, 0.55, 0.5}, Pattern::noise, 0.1, 0.6};
   scene.surfaces.push_back(make_plane(brick, {0, 0, 1}, wall_z));
+  return scene;
+}
+
+/// Poles, about five pixels wide, whose points are displaced by two pixels from those of the wall
+/// behind.
+RenderedPair render_poles() {
+  synthesis::Scene scene = wall();
+  const synthesis::Paint wood{{0.75, 0.7, 0.6}, {0.6, 0.55, 0.5}, Pattern::noise, 0.1, 0.6};
   for (const double x : {-0.9, -0.3, 0.3, 0.9}) {
     scene.surfaces.push_back(make_cylinder(wood, {x, 0, pole_z}, 0.065, 6));
   }
@@ -40,12 +46,7 @@ INSTANTIATE_TEST_SUITE_P(Exposures, ThinSurfaces, ::testing::Values(1, 0.7));
 TEST_P(ThinSurfaces, StayBeforeAWall) {
   RenderedPair pair = render_poles();
   pair.views[1].image.convertTo(pair.views[1].image, -1, GetParam());
-  Options options = Options::preset_named("fast");
-  options.min_distance = 0.5;
-  options.max_distance = 20;
-  Device device = Device::open("cpu");
-  const StereoResult result =
-      Matcher(device, pair.rig, options).match({pair.views[0].image, pair.views[1].image});
+  const ViewResult view = match_on_cpu(pair, Options::preset_named("fast"), 0.5, 20);
 
   const GroundTruth& truth = pair.views[0].truth;
   int pixels = 0;
@@ -61,7 +62,7 @@ TEST_P(ThinSurfaces, StayBeforeAWall) {
       if (z > 0.5 * (pole_z + wall_z) || std::abs(distance * ray.y()) > 1.5) continue;
       ++pixels;
       // Half way to the wall, in displacement.
-      const double found = static_cast<double>(result.views[0].distance.at<float>(y, x)) * ray.z();
+      const double found = static_cast<double>(view.distance.at<float>(y, x)) * ray.z();
       lost += 1 / found < 0.5 * (1 / pole_z + 1 / wall_z) ? 1 : 0;
     }
   }
@@ -74,23 +75,16 @@ TEST_P(ThinSurfaces, StayBeforeAWall) {
 TEST(SmallNearSurfaces, AreFoundThoughTheCoarsestImageHidesThem) {
   constexpr int side = 288;
   constexpr double ball_distance = 0.33;
-  synthesis::Scene scene;
-  scene.light = {0.5, -2, 0};
-  const synthesis::Paint brick{{0.7, 0.6, 0.5}, {0.35, 0.3, 0.3}, Pattern::noise, 0.3, 1.2};
+  synthesis::Scene scene = wall();
   const synthesis::Paint cloth{{0.8, 0.3, 0.2}, {0.3, 0.6, 0.8}, Pattern::noise, 0.01, 1.2};
-  scene.surfaces.push_back(make_plane(brick, {0, 0, 1}, wall_z));
   scene.surfaces.push_back(make_sphere(cloth, {0.05, 0.02, ball_distance}, 0.045));
   const RenderedPair pair = render(scene, demo_rig(side), 1);
   Options options = Options::preset_named("fast");
-  options.min_distance = 0.2;
-  options.max_distance = 20;
   options.levels = 4;
-  Device device = Device::open("cpu");
-  const StereoResult result =
-      Matcher(device, pair.rig, options).match({pair.views[0].image, pair.views[1].image});
+  const ViewResult view = match_on_cpu(pair, options, 0.2, 20);
   const GroundTruth& truth = pair.views[0].truth;
   const cv::Mat on_ball = (truth.distance > 0) & (truth.distance < 2 * ball_distance);
-  const cv::Mat found = (result.views[0].distance < 2 * ball_distance) & on_ball;
+  const cv::Mat found = (view.distance < 2 * ball_distance) & on_ball;
   const int pixels = cv::countNonZero(on_ball);
   ASSERT_GT(pixels, 200);
   RecordProperty("found",

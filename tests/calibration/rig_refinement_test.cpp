@@ -16,10 +16,8 @@
 namespace widestereo {
 namespace {
 
-constexpr double radians = radians_per_degree;
-
 Eigen::AngleAxisd turned(double degrees, const Eigen::Vector3d& axis) {
-  return Eigen::AngleAxisd(degrees * radians, axis.normalized());
+  return Eigen::AngleAxisd(degrees * radians_per_degree, axis.normalized());
 }
 
 /// Three views of two models, somewhere in the common frame.
@@ -34,7 +32,7 @@ Rig true_rig() {
   fisheye.alpha = 0.59;
   Camera equidistant = fisheye;
   equidistant.model = CameraModel::kannala_brandt;
-  equidistant.max_theta = 95 * radians;
+  equidistant.max_theta = 95 * radians_per_degree;
   equidistant.k1 = 0.01;
   equidistant.k2 = -0.002;
   const Eigen::Isometry3d base = Eigen::Translation3d(3, -2, 1) * turned(70, {1, 2, 3});
@@ -98,7 +96,7 @@ double rotation_error(const Rig& a, const Rig& b, std::size_t view) {
   return Eigen::AngleAxisd(a.views[view].world_from_camera.linear() *
                            b.views[view].world_from_camera.linear().transpose())
              .angle() /
-         radians;
+         radians_per_degree;
 }
 
 Eigen::Vector3d arm(const Rig& rig, std::size_t view) {
@@ -290,7 +288,7 @@ Rig surround_rig() {
   rig.views.resize(2);
   for (View& view : rig.views) {
     view.camera = rig.views[1].camera;
-    view.camera.max_theta = 100 * radians;
+    view.camera.max_theta = 100 * radians_per_degree;
   }
   const Eigen::Isometry3d& base = rig.views[0].world_from_camera;
   for (int i : {0, 1}) {
@@ -364,7 +362,7 @@ TEST(RigRefinement, FieldsOfViewTellWhichPairsToMatch) {
   EXPECT_TRUE(share_field_of_view(rig.views[0], rig.views[1]));
   EXPECT_TRUE(share_field_of_view(rig.views[2], rig.views[3]));
   EXPECT_TRUE(share_field_of_view(rig.views[0], rig.views[2])) << "at their rims";
-  for (View& view : rig.views) view.camera.max_theta = 85 * radians;
+  for (View& view : rig.views) view.camera.max_theta = 85 * radians_per_degree;
   EXPECT_TRUE(share_field_of_view(rig.views[0], rig.views[1]));
   EXPECT_FALSE(share_field_of_view(rig.views[0], rig.views[2]));
   EXPECT_FALSE(share_field_of_view(rig.views[3], rig.views[1]));
