@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "geometry/validation.h"
-#include "text/byte_order_mark.h"
+#include "text/text_input.h"
 #include "widestereo/error.h"
 
 namespace widestereo::calibration {
@@ -31,12 +31,6 @@ struct Observation {
 
 constexpr std::uint64_t no_point = ~std::uint64_t{0};
 
-std::ifstream open(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw Error("Cannot read " + path.string() + "; check its permissions.");
-  return file;
-}
-
 Eigen::Isometry3d pose_of(std::span<const double, 7> v, const std::string& where) {
   const Eigen::Quaterniond rotation(v[0], v[1], v[2], v[3]);
   return Eigen::Translation3d(v[4], v[5], v[6]) *
@@ -46,9 +40,7 @@ Eigen::Isometry3d pose_of(std::span<const double, 7> v, const std::string& where
 /// A .txt file of a model.
 class TextFile {
  public:
-  explicit TextFile(const fs::path& path) : path_(path), file_(open(path)) {
-    skip_byte_order_mark(file_);
-  }
+  explicit TextFile(const fs::path& path) : path_(path), file_(path) {}
 
   /// The next line that is neither blank nor a comment.
   bool next_record() {
@@ -61,7 +53,7 @@ class TextFile {
 
   /// The next line, whatever is in it.
   bool next_line() {
-    if (!std::getline(file_, text_)) return false;
+    if (!file_.next_line(text_)) return false;
     ++number_;
     line_ = std::istringstream(text_);
     line_.imbue(std::locale::classic());
@@ -94,7 +86,7 @@ class TextFile {
 
  private:
   fs::path path_;
-  std::ifstream file_;
+  TextInput file_;
   std::string text_;
   std::istringstream line_;
   int number_ = 0;
@@ -103,7 +95,9 @@ class TextFile {
 /// A .bin file of a model.
 class BinaryFile {
  public:
-  explicit BinaryFile(const fs::path& path) : path_(path), file_(open(path)) {}
+  explicit BinaryFile(const fs::path& path) : path_(path), file_(path, std::ios::binary) {
+    if (!file_) throw Error("Cannot read " + path.string() + "; check its permissions.");
+  }
 
   template <class T>
   T read() {

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 
 #include "calibration/formats.h"
+#include "text/text_input.h"
 
 namespace widestereo::calibration {
 namespace {
@@ -41,10 +41,7 @@ const ColmapModel* find_model(const std::string& name) {
   return find_colmap_model(name == aria_name ? "RAD_TAN_THIN_PRISM_FISHEYE" : name);
 }
 
-Json parsed(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return Json::parse(stream, nullptr, false);
-}
+Json parsed(const fs::path& file) { return Json::parse(TextInput(file).rest(), nullptr, false); }
 
 bool has_frames(const Json& root) {
   return root.is_object() && root.contains("frames") && root["frames"].is_array();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
 #include <cmath>
-#include <fstream>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -16,7 +15,7 @@
 #include "calibration/orb_slam.h"
 #include "calibration/woodscape.h"
 #include "geometry/validation.h"
-#include "text/byte_order_mark.h"
+#include "text/text_input.h"
 #include "widestereo/error.h"
 #include "widestereo/sfm_model.h"
 
@@ -111,7 +110,7 @@ void add_view_of_body(Rig& rig, View view, const Eigen::Isometry3d& body_from_ca
 
 namespace {
 
-constexpr std::uintmax_t largest_file = 16 << 20;
+constexpr std::uintmax_t largest_mebibytes = 4;  // parsers take hundreds of times as much memory
 
 void require_no_part_of_a_model(const std::filesystem::path& folder) {
   const bool has_cameras = !colmap_file(folder, "cameras").empty();
@@ -132,26 +131,30 @@ Document load(const std::filesystem::path& path) {
     throw Error("Cannot read " + path.string() + " (" + error.message() +
                 "); check the permissions of its folder.");
   }
+  const bool is_file = type == std::filesystem::file_type::regular;
+  if (is_file && std::filesystem::file_size(path, error) > largest_mebibytes << 20) {
+    throw Error(path.string() + " is too large for a calibration file (" +
+                std::to_string(largest_mebibytes) + " MiB).");
+  }
   if (is_sfm_model(path)) {
     throw Error(path.string() +
                 " is a COLMAP model or transforms.json, which calibrates images; only `depth`, "
                 "`reconstruct`, `calibration check` and `view-synthesis` take it.");
   }
   require_no_part_of_a_model(path);
-  if (type != std::filesystem::file_type::regular) {
+  if (type == std::filesystem::file_type::directory) {
+    const std::filesystem::directory_iterator entries(path, error);
+    if (error) {
+      throw Error("Cannot read the folder " + path.string() + ": " + error.message() +
+                  "; check its permissions.");
+    }
+  }
+  if (!is_file) {
     throw Error(path.string() +
                 " is not a file; give a calibration file, a folder with cam0/sensor.yaml or, for "
                 "images that it has, a COLMAP model, the folder that holds cameras.bin or .txt.");
   }
-  if (std::filesystem::file_size(path, error) > largest_file) {
-    throw Error(path.string() + " is too large for a calibration file (16 MiB).");
-  }
-  std::ifstream file(path, std::ios::binary);
-  skip_byte_order_mark(file);
-  std::stringstream text;
-  text << file.rdbuf();
-  if (!file) throw Error("Cannot read " + path.string() + "; check its permissions.");
-  return {path, text.str()};
+  return {path, TextInput(path).rest()};
 }
 
 CalibrationFormat format_of(const Document& document) {

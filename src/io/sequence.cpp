@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <fstream>
 #include <functional>
 #include <map>
 
 #include "io/frame_times.h"
-#include "text/byte_order_mark.h"
 #include "text/lower_case.h"
+#include "text/text_input.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -101,14 +100,12 @@ Images images_in(const fs::path& folder) {
 }
 
 Images images_listed_in(const fs::path& list) {
-  std::ifstream file(list);
-  if (!file) throw Error("Cannot read " + list.string() + "; check its permissions.");
-  skip_byte_order_mark(file);
+  TextInput file(list);
   Images images;
   images.listed = true;
   std::map<std::string, int> lines;
   std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
+  for (int number = 1; file.next_line(line); ++number) {
     while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
     if (line.empty() || line[0] == '#') continue;
     const std::size_t comma = line.find(',');
@@ -290,9 +287,10 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
   std::size_t end = name.size();
   std::size_t start = start_of_digits(end);
   std::string fraction;
-  if (start > 0 && start < end && name[start - 1] == '.') {
+  const std::size_t point = start > 0 && start < end ? start - 1 : std::string::npos;
+  if (point != std::string::npos && name[point] == '.' && start_of_digits(point) < point) {
     fraction = name.substr(start);
-    end = start - 1;
+    end = point;
     start = start_of_digits(end);
   }
   const std::string whole = name.substr(start, end - start);

@@ -4,14 +4,13 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <optional>
 #include <sstream>
 
 #include "geometry/validation.h"
 #include "io/frame_times.h"
-#include "text/byte_order_mark.h"
 #include "text/number.h"
+#include "text/text_input.h"
 #include "widestereo/error.h"
 #include "widestereo/sequence.h"
 
@@ -143,13 +142,11 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, ignored)) {
     throw Error("The poses " + path.string() + " are a folder; give the file in it.");
   }
-  std::ifstream file(path);
-  if (!file) throw Error("Cannot read the poses " + path.string() + "; check the path.");
-  skip_byte_order_mark(file);
+  TextInput file(path);
   Trajectory trajectory;
   std::optional<PoseLine> layout;
   std::string header, line;
-  for (int number = 1; std::getline(file, line); ++number) {
+  for (int number = 1; file.next_line(line); ++number) {
     const std::size_t first = line.find_first_not_of(space);
     if (first == std::string::npos) continue;
     if (line[first] == '#') {

@@ -951,6 +951,29 @@ TEST(BadCalibration, UnreadableFoldersAreNamed) {
   const std::string error = error_of(folder / "closed/calib.yaml");
   std::filesystem::permissions(folder / "closed", std::filesystem::perms::owner_all);
   EXPECT_NE(error.find("calib.yaml (Permission denied)"), std::string::npos) << error;
+  folder.write("secret.yaml", kalibr_text);
+  for (const char* name : {"closed", "secret.yaml"}) {
+    std::filesystem::permissions(folder / name, std::filesystem::perms::none);
+    const std::string of_entry = error_of(folder / name);
+    std::filesystem::permissions(folder / name, std::filesystem::perms::owner_all);
+    EXPECT_NE(of_entry.find(std::string(name) + ": Permission denied; check"), std::string::npos)
+        << of_entry;
+  }
+}
+
+TEST(BadCalibration, FilesThatCannotBeReadOnAreNoShorterOnes) {
+  EXPECT_NE(error_of("/proc/self/mem").find("Cannot read /proc/self/mem: Input/output error"),
+            std::string::npos);
+}
+
+TEST(BadCalibration, LargeFilesAreRefusedBeforeTheyAreParsed) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.yaml", "transforms.json"}) {
+    folder.write(name, "{");
+    std::filesystem::resize_file(folder / name, (4 << 20) + 1);
+    const std::string error = error_of(folder / name);
+    EXPECT_NE(error.find("too large for a calibration file (4 MiB)"), std::string::npos) << error;
+  }
 }
 
 TEST(BadCalibration, WhatAColmapModelLacksIsNamed) {

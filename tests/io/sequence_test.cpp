@@ -133,6 +133,8 @@ TEST(TimeInName, IsInTheUnitOfItsDigits) {
   EXPECT_EQ(time_in_name("1305031102.175304"), 1305031102175304000) << "TUM RGB-D";
   EXPECT_EQ(time_in_name("rgb-1305031102.1753041234"), 1305031102175304123);
   EXPECT_EQ(time_in_name("1305031102"), 1305031102000000000);
+  EXPECT_EQ(time_in_name("left.1403636579763555584"), 1403636579763555584);
+  EXPECT_EQ(time_in_name("left.1305031102.25"), 1305031102250000000);
 }
 
 TEST(TimeInName, IsNoOtherNumber) {
@@ -252,6 +254,13 @@ TEST_F(Sequences, FramesOfOneNameAreRefused) {
     EXPECT_THAT(error({1}), HasSubstr(std::string("cam1/") + name + " gives its frame no usable"));
     fs::remove(folder_ / "cam1" / name);
   }
+}
+
+TEST_F(Sequences, ListsThatCannotBeReadOnAreNoShorterOnes) {
+  add("mav0/cam0/data/a.png");
+  fs::create_symlink("/proc/self/mem", folder_ / "mav0/cam0/data.csv");  // an I/O error
+  EXPECT_THAT(error({0}), HasSubstr("Cannot read " + folder_.path().string()));
+  EXPECT_THAT(error({0}), HasSubstr("data.csv: Input/output error; check the path and perm"));
 }
 
 TEST_F(Sequences, UnreadableFoldersAreNamed) {
@@ -377,6 +386,11 @@ TEST_F(Trajectories, MayBeAPipe) {
       [&] { EXPECT_EQ(read_trajectory(pipe).poses.at(0).world_from_body.translation().z(), 2); });
   writer.join();
   EXPECT_EQ(error, "");
+}
+
+TEST_F(Trajectories, ThatCannotBeReadOnAreNoShorterOnes) {
+  EXPECT_EQ(error_of([] { read_trajectory("/proc/self/mem"); }),
+            "Cannot read /proc/self/mem: Input/output error; check the path and permissions.");
 }
 
 TEST_F(Trajectories, BrokenLinesAreNamed) {
