@@ -47,7 +47,10 @@ std::string name_of(const fs::path& path) {
   return name.generic_string();
 }
 
-fs::path whole_path(const fs::path& file) { return fs::absolute(file).lexically_normal(); }
+fs::path whole_path(const fs::path& file) {
+  if (file.empty()) throw Error("An image's path is empty; give one.");
+  return fs::absolute(file).lexically_normal();
+}
 
 /// What is left of an image's file without its name in the model.
 fs::path folder_of_images(const fs::path& file, const fs::path& name) {
@@ -226,6 +229,7 @@ class SfmModel::Implementation {
                                      [&](std::uint64_t number, const Eigen::Vector3d& position) {
                                        const auto observed = observers.find(number);
                                        if (observed == observers.end()) return;
+                                       if (!position.allFinite()) return;
                                        positions_.emplace(number, position);
                                        points.push_back({position, std::move(observed->second)});
                                      });

@@ -44,6 +44,9 @@ ViewCloud cloud_of(const View& view, const ViewMaps& maps) {
   cv::extractChannel(rays, usable, 3);
   cv::Mat distance = maps.distance.clone();
   distance.setTo(0, usable == 0);
+  // What lies so near has, in single precision, the position of the camera itself.
+  constexpr double least_share = 1e-6;
+  distance.setTo(0, distance <= least_share * view.world_from_camera.translation().norm());
   cloud.points = make_point_cloud(distance, rays, maps.normals, maps.image, maps.confidence,
                                   view.world_from_camera);
   cloud.points.shrink_to_fit();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -295,6 +296,8 @@ TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {
   EXPECT_EQ(model.source_files("/data/right/none.png", 9), Files{});
   EXPECT_NE(test::error_of([&] { model.source_files("b.png", 1); }).find("b.png"),
             std::string::npos);
+  EXPECT_EQ(test::error_of([&] { model.source_files("", 1); }),
+            "An image's path is empty; give one.");
 }
 
 /// Images of one set of points each, 10 in front of them, 0.9 apart; out of the order of names.
@@ -354,6 +357,30 @@ TEST_F(Colmap, ReadsBinaryPoints) {
   EXPECT_DOUBLE_EQ(range->farthest, 5);
   folder_.write("points3D.bin", points.substr(0, points.size() - 1));
   EXPECT_NE(error({"b.png"}).find("points3D.bin ends too early"), std::string::npos);
+}
+
+TEST_F(Colmap, PointsWithoutAFinitePositionTellNothing) {
+  std::string images = bytes(std::uint64_t{2}), points = bytes(std::uint64_t{11});
+  for (const std::uint32_t i : {1u, 2u}) {
+    images += bytes(i) + doubles(1, 0, 0, 0, -0.9 * (i - 1.0), 0, 0) + bytes(std::uint32_t{7}) +
+              name(i == 1 ? "a.png" : "b.png") + bytes(std::uint64_t{11});
+    for (std::uint64_t p = 0; p < 11; ++p) images += doubles(1, 2) + bytes(p);
+  }
+  for (std::uint64_t p = 0; p < 11; ++p) {
+    points += bytes(p) + doubles(p == 4 ? std::nan("") : 0.1 * static_cast<double>(p), 0, 10) +
+              std::string(3, '\7') + doubles(0.5) + bytes(std::uint64_t{0});
+  }
+  write_binary(cameras_binary(), images);
+  folder_.write("points3D.bin", points);
+  EXPECT_EQ(SfmModel(folder_.path()).source_files("/data/a.png", 1),
+            std::vector<fs::path>{"/data/b.png"});
+}
+
+TEST_F(Colmap, FilesThatCannotBeReadOnAreNoShorterOnes) {
+  write_text();
+  fs::remove(folder_ / "images.txt");
+  fs::create_symlink("/proc/self/mem", folder_ / "images.txt");  // an I/O error
+  EXPECT_NE(error().find("images.txt: Input/output error"), std::string::npos) << error();
 }
 
 TEST_F(Colmap, EveryTruncatedBinaryFileIsAnError) {

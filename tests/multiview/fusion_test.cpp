@@ -463,6 +463,22 @@ TEST_F(Fusion, PixelsWithoutARayMakeNoPoints) {
   }
 }
 
+TEST_F(Fusion, WhatIsAsNearAsPositionsAreRoundedIsNoPoint) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    views_[i].world_from_camera.translation() += Eigen::Vector3d(5, 5, 5);
+  }
+  FusionOptions options;
+  options.min_views = 1;
+  for (const double distance : {1e-9, 1e-7, 1e-5, 1e-3}) {
+    for (ViewMaps& maps : maps_) maps.distance.setTo(distance, maps.distance > 0);
+    const PointCloud cloud = fuse_all(options);
+    EXPECT_EQ(cloud.empty(), distance < 5e-6) << distance;
+    for (const CloudPoint& point : cloud) {
+      ASSERT_TRUE(point.position.allFinite() && point.normal.allFinite()) << distance;
+    }
+  }
+}
+
 TEST_F(Fusion, RefusesLimitsAndViewsThatAreNone) {
   const auto error = [this](const FusionOptions& options) {
     return test::error_of([&] {
