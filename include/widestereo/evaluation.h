@@ -44,9 +44,9 @@ constexpr double interior_edge_clearance = 8;  ///< pixels
 /// Scores over one set of pixels. Shares lie in [0, 1]; a pixel without prediction counts as bad.
 /// Shares, means and medians over no pixel at all are NaN (null in JSON), but for completeness.
 struct RegionScores {
-  /// "all", where occlusion is known "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90 deg",
-  /// and where there is an image "textured" and "textured interior" (textured, and not at an edge of
-  /// the true scene).
+  /// "all", where occlusion is known "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90
+  /// deg", and where there is an image "textured" and "textured interior" (textured, and not at an
+  /// edge of the true scene).
   std::string region;
   long pixels = 0;          ///< pixels scored
   double completeness = 0;  ///< share with a prediction, 0 of no pixel
@@ -71,8 +71,9 @@ struct RegionScores {
 /// `reference` against ground truth. Displacements are those of the predicted point's projection in
 /// view `source` from the true one's: a predicted point that does not project there counts as bad,
 /// a pixel whose true point lies outside the source image has none. `normals` (may be empty) as in
-/// GroundTruth. Field-angle bands and the textured regions are taken over the non-occluded pixels, all
-/// where occlusion is not known.
+/// GroundTruth. Field-angle bands and the textured regions are taken over the non-occluded pixels,
+/// all where occlusion is not known. Throws Error, as all scores here do, for maps and views that
+/// do not fit, and for views of one centre.
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source);
@@ -89,7 +90,8 @@ struct FarScores {
   double right = 0;     ///< share of them whose predicted point lies within 2 px of that point
 };
 
-/// `truth` needs a field of view; GroundTruth::valid has no part in it.
+/// `truth` needs a field of view; GroundTruth::valid has no part in it. `far_distance`: metres
+/// along the ray.
 FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const View& reference,
                      const View& source, double far_distance);
 

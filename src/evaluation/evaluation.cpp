@@ -59,7 +59,11 @@ Eigen::Vector3d direction(const cv::Vec4f& ray) {
 class SourceView {
  public:
   SourceView(const View& source, const View& reference)
-      : camera_(source.camera), motion_(source_from_reference(source, reference)) {}
+      : camera_(source.camera), motion_(source_from_reference(source, reference)) {
+    require_valid(source, "The evaluation");
+    // From one centre every distance fits.
+    require_baseline(reference, source, "The evaluation");
+  }
 
   bool in_image(const Eigen::Vector3d& point, Eigen::Vector2d& pixel) const {
     return camera_.project_into_image(motion_ * point, pixel);
@@ -327,6 +331,10 @@ FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const Vi
     throw Error(
         "Far things without ground truth are told from the lens's border by a mask of the "
         "field of view; give one.");
+  }
+  if (!has_distance(static_cast<float>(far_distance))) {
+    throw Error("The distance of far things is " + text_of(far_distance) +
+                "; give one that is finite and above 0.");
   }
   const cv::Mat rays = ray_image(reference.camera, {});
   const SourceView source_view(source, reference);

@@ -100,7 +100,6 @@ std::string to_json(const std::vector<SparsificationPoint>& curve) {
 }
 
 std::string to_table(const std::vector<ReliabilityBin>& bins) {
-  if (bins.empty()) return "";
   double total = 0;
   for (const ReliabilityBin& bin : bins) total += static_cast<double>(bin.pixels);
   std::vector<std::string> lines;
@@ -115,6 +114,7 @@ std::string to_table(const std::vector<ReliabilityBin>& bins) {
                               bin->high, 100 * pixels / total, bin->mean_confidence,
                               100 * bin->right, 100 * above / total, 100 * right_above / above));
   }
+  if (lines.empty()) return "";
   std::string table = formatted("%-12s %10s %10s %9s | %9s %9s\n", "confidence", "pixels", "mean",
                                 "right", "and above", "right");
   for (auto line = lines.rbegin(); line != lines.rend(); ++line) table += *line;

@@ -35,6 +35,7 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
   require_calibrated_size(other_image, other, "The image of " + other.name);
   require_type(distance, CV_32FC1, "The distance map of " + view.name);
   require_type(other_image, CV_8UC1, "The image of " + other.name);
+  for (const View* each : {&view, &other}) require_valid(*each, "The view synthesis");
   // From one centre every distance fits.
   require_baseline(view, other, "The view synthesis");
   const Eigen::Isometry3d motion = source_from_reference(other, view);

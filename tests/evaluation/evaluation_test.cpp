@@ -222,8 +222,23 @@ TEST_F(FourPixels, FarThingsWithoutGroundTruthAreRightWithinTwoPixels) {
   far = far_scores(distance, truth_, reference_, source_, 100);
   EXPECT_EQ(far.pixels, 2);
   EXPECT_NEAR(far.right, 0.5, 1e-12);
+  for (const double nowhere : {0.0, -5.0, std::nan(""), 1e300}) {
+    EXPECT_THROW(far_scores(distance, truth_, reference_, source_, nowhere), Error) << nowhere;
+  }
   truth_.field_of_view.release();
   EXPECT_THROW(far_scores(distance, truth_, reference_, source_, 100), Error);
+}
+
+TEST_F(FourPixels, SourcesTellDistances) {
+  const auto error = [this] {
+    return test::error_of([this] { evaluate(truth_.distance, {}, truth_, reference_, source_); });
+  };
+  EXPECT_EQ(error(), "");
+  source_.camera.fx = std::nan("");
+  EXPECT_THAT(error(), ::testing::HasSubstr("fx"));
+  source_.camera.fx = 100;
+  source_.world_from_camera.setIdentity();
+  EXPECT_THAT(error(), ::testing::HasSubstr("the same centre"));
 }
 
 /// 40 x 24 pixels, stripes in the right half, a step of distance at column 30, a crease at row 20.
@@ -495,6 +510,8 @@ TEST_F(FourPixels, ReliabilityIsOfBinsThatBeginWithTheirLowerEnd) {
   EXPECT_THAT(
       to_table(bins),
       ::testing::HasSubstr("0.50 to 0.70      50.0%      0.500     50.0% |     75.0%     66.7%\n"));
+  truth_.distance.setTo(0);
+  EXPECT_EQ(to_table(reliability(distance, confidence, truth_, reference_, source_)), "");
 }
 
 TEST(Evaluation, SparsificationFallsWhenConfidenceIsRight) {

@@ -119,6 +119,8 @@ TEST_F(ViewSynthesis, NeedsABaseline) {
   Rig rig = pair.rig;
   rig.views[1].world_from_camera.translation() = rig.views[0].world_from_camera.translation();
   EXPECT_THAT(error_of([&] { scores_of(truth, rig); }), ::testing::HasSubstr("the same centre"));
+  rig.views[1].camera.fx = -1;
+  EXPECT_THAT(error_of([&] { scores_of(truth, rig); }), ::testing::HasSubstr("fx"));
 }
 
 TEST_F(ViewSynthesis, NeedsMapsOfTheDocumentedTypes) {
