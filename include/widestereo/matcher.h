@@ -146,8 +146,7 @@ class Matcher {
 
   /// The same for the next frame of a sequence, from the previous frame's planes instead of from
   /// none (Options::warm_iterations): a fraction of the work where most of the scene was seen
-  /// before. Throws Error where there are no such planes. That no view sees any more what another
-  /// one does shows in the reasons alone.
+  /// before. Throws Error where there are no such planes, and where match() does.
   StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
                           const Progress& progress = {});
 

@@ -38,8 +38,8 @@ struct RigRefinement {
   std::vector<std::string> left_out;          ///< why each pair did not count; empty where it did
 };
 
-/// Whether enough of what one view sees, 0.3 to 50 m away, is in the other one for features to be
-/// matched: more than 2 %.
+/// Whether enough of what one view sees, in the range of distances of Options, is in the other one
+/// for features to be matched: more than 2 %.
 bool share_field_of_view(const View& first, const View& second);
 
 /// The rig that matches fit best, near the calibrated one: for cameras that have moved since they

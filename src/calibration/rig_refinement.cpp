@@ -13,6 +13,7 @@
 #include "statistics/robust.h"
 #include "text/formatted.h"
 #include "widestereo/error.h"
+#include "widestereo/options.h"
 #include "widestereo/view_selection.h"
 
 namespace widestereo {
@@ -30,8 +31,7 @@ constexpr double centre_deviation = 1;     // pixels
 constexpr double largest_change = 5;       // deviations: what matches of other views would fit
 
 /// Where views that see the same are told from those that do not.
-constexpr double nearest = 0.3, farthest = 50;  // metres
-constexpr double least_shared = 0.02;           // of the points that the view with fewer sees
+constexpr double least_shared = 0.02;  // of the points that the view with fewer sees
 
 /// Unknowns of a view: its turn (radians, common frame), the shift of its centre across the line
 /// from view 0's (in units of that distance), the logarithm of its focal lengths, its principal
@@ -370,7 +370,9 @@ void require_connected(const Rig& rig, const std::vector<ViewMatches>& pairs,
 bool share_field_of_view(const View& first, const View& second) {
   std::array<int, 2> seen = {0, 0};
   int shared = 0;
-  for (const ObservedPoint& point : assumed_points({first, second}, nearest, farthest)) {
+  const Options usual;
+  for (const ObservedPoint& point :
+       assumed_points({first, second}, usual.min_distance, usual.max_distance)) {
     for (const std::size_t observer : point.observers) ++seen[observer];
     if (point.observers.size() == 2) ++shared;
   }

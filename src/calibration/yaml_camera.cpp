@@ -57,7 +57,7 @@ void read_yaml(const Document& document, const std::function<void(const YAML::No
 
 YamlCamera::YamlCamera(const Document& document, const std::string& name, const YAML::Node& node)
     : document_(document), name_(name), node_(node) {
-  if (!node.IsMap()) fail("It must hold keys such as camera_model and intrinsics.");
+  if (!node || !node.IsMap()) fail("It must hold keys such as camera_model and intrinsics.");
   require_single_keys(document, node, name + ": ");
 }
 

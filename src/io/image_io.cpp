@@ -309,8 +309,9 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
 void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
   require_pixels(map, "Cannot write " + path.string() + ": the map");
   require_png_scale(png_scale);
-  if (map.type() != CV_32FC1 && map.type() != CV_32FC3) {
-    throw Error("Cannot write " + path.string() + ": a map needs one or three float channels.");
+  if (map.dims > 2 || (map.type() != CV_32FC1 && map.type() != CV_32FC3)) {
+    throw Error("Cannot write " + path.string() +
+                ": a map needs two dimensions and one or three float channels.");
   }
   const std::string extension = extension_of(path);
   if (extension == ".pfm") {

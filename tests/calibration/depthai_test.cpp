@@ -123,6 +123,10 @@ TEST_F(DepthAi, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(error(replaced("[1, {", "[0, {")), HasSubstr("socket twice"));
   EXPECT_THAT(error(replaced("[1, {", "[99, {")), HasSubstr("pairs of a socket"));
   EXPECT_THAT(error(replaced("\"x\": -3.75", "\"u\": -3.75")), HasSubstr("The key x is missing"));
+  EXPECT_THAT(error(replaced("\"extrinsics\"", "\"others\"")),
+              HasSubstr("CAM_A: extrinsics: It must hold keys"));
+  EXPECT_THAT(error(replaced("\"translation\": {\"x\": -3.75", "\"moved\": {\"x\": -3.75")),
+              HasSubstr("CAM_B: extrinsics: translation: It must hold keys"));
   EXPECT_GT(test::times_refused(good, [this](const std::string& text) { return error(text); }),
             100);
 }

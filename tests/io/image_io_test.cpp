@@ -123,6 +123,13 @@ TEST(Maps, UnsupportedOnesAreRefused) {
   write_image(folder / "grey.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(3)));
   EXPECT_NE(error_of([&] { read_map(folder / "grey.png"); }).find("grey.png"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.png"));
+  const std::array<int, 3> sizes = {3, 4, 5};
+  const cv::Mat volume(3, sizes.data(), CV_32FC1, cv::Scalar(1));
+  for (const char* name : {"a.pfm", "a.exr", "a.tiff", "a.png"}) {
+    EXPECT_NE(error_of([&] { write_map(folder / name, volume); }).find("two dimensions"),
+              std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(folder / name));
+  }
 }
 
 TEST(Maps, WithoutPixelsAreNotWritten) {
