@@ -8,6 +8,9 @@
 #define NEIGHBOUR_SHARE 4.5f
 #define OWN_SHARE 0.3f
 #define LARGEST_SQUARED_SCALE 0.72f  // px^2
+// Inverse square of the displacement (px) from the pixel's plane at which a neighbour's own plane passes the pixel where
+// it weighs a quarter.
+#define PER_SQUARED_PASSING 16.0f
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
@@ -28,6 +31,10 @@ struct PlaneFit {
   float agreement;   // share of the neighbours' weights that robustness leaves: 1 where all lie on the guess
 };
 
+// Whether neighbours' planes, too, come from a regression of this level. What lies beyond a crease may be near the
+// pixel's plane by itself, but its own plane passes the pixel far off.
+FN bool planes_are_regressed(CONTEXT_ARGUMENT_ONLY) { return PASS.tolerance < 1.0f; }
+
 // One round of robust weighted least squares over a sparse grid of the neighbourhood; false where it is
 // degenerate.
 FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south, vec4 own,
@@ -44,6 +51,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   int step = max(radius / PASS.steps, 1);
   radius = min(radius, step * PASS.steps);
   float fall_off = 0.25f / float(radius * radius);  // of the eighth root of the Gaussian
+  bool by_planes = planes_are_regressed(CONTEXT_ONLY);
   // Every tile's grids lie elsewhere: pixels a step apart would share theirs and none with those between.
   vec4 u = draw4_of_tile(CONTEXT pixel, REGRESSION_SLOT + round);
   int first_x = pixel.x + first_in_image(pixel.x, int(u.x * float(step)) - step / 2 - radius, step);
@@ -78,11 +86,18 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
       // weighs shares one division.
       float scale2 = min(of_neighbour * measure.x + of_own, LARGEST_SQUARED_SCALE);
       float doubt = scale2 + displacement * displacement;
+      float strangeness = 1.0f;
+      if (by_planes) {
+        vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
+        float passing = own.y * (dot(vec3(plane.x, plane.y, plane.z), ray) - guess.offset);
+        strangeness += PER_SQUARED_PASSING * (passing * passing);
+      }
       float remoteness = 1.0f + fall_off * (squared_dy + dx * dx);
       float unlikeness = root_of_unlikeness(measure.w - own.w, inverse_scale);
       float trust = measure.y * scale2;
       float most = measure.y * doubt;
-      float divided = 1.0f / (measure.x * (doubt * doubt) * eighth_power(remoteness * unlikeness));
+      float divided = 1.0f / (measure.x * (doubt * doubt) * (strangeness * strangeness) *
+                              eighth_power(remoteness * unlikeness));
       if (measure.x >= UNMEASURED_VARIANCE) divided = 0.0f;
       float weight = trust * trust * divided;
       undoubted += most * most * divided;

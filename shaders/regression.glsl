@@ -14,7 +14,9 @@
 #define SMALLEST_SQUARED_MOVE_OF_MIXED 0.01f
 #define LARGEST_SQUARED_MOVE_OF_MIXED 9.0f
 
-FN bool mixes_surfaces(CONTEXT_ARGUMENT PlaneFit fit) { return PASS.tolerance < 1.0f && fit.agreement < LEAST_AGREEMENT; }
+FN bool mixes_surfaces(CONTEXT_ARGUMENT PlaneFit fit) {
+  return planes_are_regressed(CONTEXT_ONLY) && fit.agreement < LEAST_AGREEMENT;
+}
 
 // The plane of the smallest neighbourhood that determines its offset to PASS.deviation, or of the largest that does not
 // contradict the one before: a thin surface never determines its own, and what is behind it would outvote it. With

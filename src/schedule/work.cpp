@@ -191,8 +191,9 @@ double regression_operations(const Dispatch& dispatch) {
   const bool normals = pass.deviation == 0 || (pass.candidates & REGRESS_NORMALS) != 0;
   const FitOperations operations;
   const int side = side_of_fit(pass.radius >> WHOLE_RADIUS_ROUND, pass.steps);
-  return (normals ? 2 : 1) *
-         (operations.of_fit + side * (operations.of_row + side * operations.of_neighbour));
+  const int of_neighbour =
+      operations.of_neighbour + (pass.tolerance < 1 ? operations.of_neighbours_plane : 0);
+  return (normals ? 2 : 1) * (operations.of_fit + side * (operations.of_row + side * of_neighbour));
 }
 
 }  // namespace

@@ -19,7 +19,8 @@ PatchOperations patch_operations(const KernelConstants& constants);
 
 /// Those of shaders/plane_fit.glsl, counted likewise.
 struct FitOperations {
-  int of_neighbour = 71;  ///< in the loop over a row of neighbours
+  int of_neighbour = 73;         ///< in the loop over a row of neighbours
+  int of_neighbours_plane = 10;  ///< besides, in rounds after the first
   int of_row = 1;
   int of_fit = 49;  ///< around both loops, after random numbers
 };

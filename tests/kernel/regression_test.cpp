@@ -229,6 +229,24 @@ TEST_F(Regression, LaterRoundsTellSmoothSurfacesApartThatLieNearEachOther) {
   EXPECT_LT(error(0.36f), 0.7 * error(1));
 }
 
+TEST_F(Regression, LaterRoundsDoNotRoundCreases) {
+  // Planes that meet in the column of the axis, where rays have no x, and part by 0.1 px a column.
+  const auto crease = [](int x) -> Eigen::Vector3d {
+    return x < size / 2 ? wall : wall + Eigen::Vector3d(1, 0, 0);
+  };
+  measure(crease, 0.02, 0.01);
+  for (cv::Vec4f& check : fixture_.view(0).checks) check[0] = 0.1f;
+  for (const auto& [first, last] : {std::pair(40, 45), std::pair(50, 55)}) {
+    EXPECT_LT(over_pixels(first, last,
+                          [&](ivec2 pixel) {
+                            const Eigen::Vector3d plane = regressed(pixel, 40, 0.01, 4, 0, 0.6f);
+                            return displacement(pixel, plane, crease(pixel.x));
+                          }),
+              0.06)
+        << "columns " << first << " to " << last;
+  }
+}
+
 TEST_F(Regression, LaterRoundsDoNotLetLargerSurfacesAroundMoveSmallOnes) {
   const auto strip = [](int x) -> Eigen::Vector3d {  // 0.6 px before the wall
     return 46 <= x && x < 50 ? 1.4 * wall : wall;

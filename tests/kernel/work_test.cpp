@@ -88,11 +88,12 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
 
 /// What fitting a plane around a pixel takes, and the neighbours that it asks, relative to the
 /// pixel.
-counting::Counts counts_of_fit(KernelFixture& fixture, cv::Point pixel, int radius, int steps) {
+counting::Counts counts_of_fit(KernelFixture& fixture, cv::Point pixel, int radius, int steps,
+                               float tolerance = 1) {
   fixture.set_reference(0);
   fixture.view(0).checks.setTo(cv::Scalar(0.01, 3, 0.5, 0.5));
   fixture.pass().steps = steps;
-  fixture.pass().tolerance = 1;
+  fixture.pass().tolerance = tolerance;
   const counting::Context context = counting::context_of(fixture);
   const counting::vec3 ray(0, 0, 1), east(TANGENT_SCALE, 0, 0), south(0, TANGENT_SCALE, 0);
   const counting::LocalPlane guess{0.5f, 0.0f, 0.0f};
@@ -115,6 +116,8 @@ TEST(Work, OfAPlaneFitIsWhatRunningItTakes) {
     EXPECT_EQ(counts.operations,
               expected.of_fit + side * (expected.of_row + side * expected.of_neighbour));
     EXPECT_EQ(counts.checks.size(), static_cast<std::size_t>(side * side));
+    const counting::Counts later = counts_of_fit(fixture, {48, 48}, radius, steps, 0.6f);
+    EXPECT_EQ(later.operations - counts.operations, side * side * expected.of_neighbours_plane);
   }
 }
 
