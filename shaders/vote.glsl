@@ -104,10 +104,10 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, fl
   PatchStart start;
   int model = model_of(CONTEXT camera);
   if (begin_patch(CONTEXT pair, camera, model, source, pixel, m, true, VOTE_MIDDLE_RADIUS, start)) {
-    for (int dy = -VOTE_MIDDLE_RADIUS; dy <= VOTE_MIDDLE_RADIUS; ++dy) {
+    KEEP_LOOP for (int dy = -VOTE_MIDDLE_RADIUS; dy <= VOTE_MIDDLE_RADIUS; ++dy) {
       int first = -VOTE_MIDDLE_RADIUS;
       RowMap row = map_row(CONTEXT start.map, float(first), float(dy));
-      for (int dx = 0; dx <= VOTE_MIDDLE_RADIUS - first; ++dx) {
+      KEEP_LOOP for (int dx = 0; dx <= VOTE_MIDDLE_RADIUS - first; ++dx) {
         float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + first + dx, pixel.y + dy));
         float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
         if (min(a, b) < 0.0f) continue;
