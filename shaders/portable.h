@@ -68,15 +68,14 @@
 // Mesa unrolls the loops over patches of 3x3 pixels, and then adds in an order of its own.
 #ifdef TEXEL_LOADS
 #define UNROLL
-#define UNROLL_ROWS KEEP_LOOP
 #define UNROLL_COLUMNS KEEP_LOOP
 #define KEEP_LOOP [[dont_unroll]]
 #else
 #define UNROLL [[unroll]]
-#define UNROLL_ROWS
 #define UNROLL_COLUMNS UNROLL
 #define KEEP_LOOP
 #endif
+#define UNROLL_ROWS KEEP_LOOP
 #define OUT(T) out T
 #define INOUT(T) inout T
 #define CONTEXT
