@@ -45,6 +45,7 @@ void require_all_cameras(const Document& document, const YAML::Node& root, const
 Rig read_kalibr(const Document& document) {
   Rig rig;
   read_yaml(document, [&](const YAML::Node& root) {
+    std::vector<std::optional<double>> time_offsets;
     for (int i = 0; i < 1000; ++i) {
       const std::string name = "cam" + std::to_string(i);
       if (!root[name]) break;
@@ -57,9 +58,16 @@ Rig read_kalibr(const Document& document) {
         view.world_from_camera =
             rig.views.back().world_from_camera * camera.motion("T_cn_cnm1").inverse();
       }
-      if (camera.has(time_offset_key)) view.imu_time_offset = camera.number(time_offset_key);
+      time_offsets.emplace_back();
+      if (camera.has(time_offset_key)) time_offsets.back() = camera.number(time_offset_key);
       if (from_imu && !rig.world_from_imu) rig.world_from_imu = view.world_from_camera * *from_imu;
       rig.views.push_back(view);
+    }
+    // Cameras that are triggered together need but one.
+    const auto first = std::find_if(time_offsets.begin(), time_offsets.end(),
+                                    [](const auto& offset) { return offset.has_value(); });
+    for (std::size_t i = 0; first != time_offsets.end() && i < rig.views.size(); ++i) {
+      rig.views[i].imu_time_offset = time_offsets[i].value_or(**first);
     }
     require_all_cameras(document, root, rig);
     if (rig.views.empty()) {
@@ -146,6 +154,9 @@ std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
   validate(rig, "Cannot write " + path.string() + ": the rig");
   YAML::Emitter out;
   out << YAML::BeginMap;
+  const bool has_time_offsets =
+      std::any_of(rig.views.begin(), rig.views.end(),
+                  [](const View& view) { return view.imu_time_offset != 0; });
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     const View& view = rig.views[i];
     const calibration::KalibrForm form = calibration::kalibr_form(view, path);
@@ -173,7 +184,7 @@ std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
     if (rig.world_from_imu) {
       motion("T_cam_imu", (view.world_from_camera.inverse() * *rig.world_from_imu).matrix());
     }
-    if (view.imu_time_offset != 0) {
+    if (has_time_offsets) {
       out << YAML::Key << calibration::time_offset_key << YAML::Value
           << text_of(view.imu_time_offset);
     }

@@ -11,6 +11,7 @@
 #include <opencv2/core/persistence.hpp>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -345,6 +346,9 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     return rig;
   } catch (const cv::Exception& error) {
     document.fail("OpenCV cannot read it (" + error.err + ").");
+  } catch (const std::logic_error& error) {
+    // What its parsers do with texts that they do not foresee, such as keys without a name.
+    document.fail(std::string("OpenCV cannot read it (") + error.what() + ").");
   }
 }
 

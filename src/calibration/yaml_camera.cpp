@@ -87,7 +87,10 @@ int YamlCamera::count(const char* key) const {
 
 int YamlCamera::side(double value, const char* key) const {
   const std::optional<int> pixels = whole_number(value);
-  if (!pixels) fail(std::string("The key ") + key + " must hold whole numbers of pixels.");
+  if (!pixels) {
+    fail(std::string("The key ") + key + " has " + text_of(value) +
+         "; give whole numbers of pixels, at most a million.");
+  }
   return *pixels;
 }
 

@@ -108,7 +108,8 @@ bool is_truncated(std::span<const uchar> bytes) {
   return false;
 }
 
-cv::Mat decode(const fs::path& path) {
+/// `kind` and `formats`: what the file should be.
+cv::Mat decode(const fs::path& path, const std::string& kind, const std::string& formats) {
   const std::vector<uchar> bytes = read_bytes(path);
   if (bytes.empty()) throw Error(path.string() + " is empty; give an image file.");
   if (is_truncated(bytes)) throw Error(path.string() + " is truncated or damaged; copy it again.");
@@ -120,9 +121,8 @@ cv::Mat decode(const fs::path& path) {
     image.release();
   }
   if (image.empty()) {
-    throw Error(path.string() +
-                " is not an image that can be read (or is truncated); use PNG, JPEG, "
-                "TIFF, PGM or BMP.");
+    throw Error(path.string() + " is not " + kind + " that can be read (or is truncated); use " +
+                formats + ".");
   }
   return image;
 }
@@ -194,7 +194,7 @@ void require_png_scale(double scale) {
 }  // namespace
 
 cv::Mat read_image(const fs::path& path) {
-  cv::Mat image = decode(path);
+  cv::Mat image = decode(path, "an image", "PNG, JPEG, TIFF, PGM or BMP");
   const bool depth_known = image.depth() == CV_8U || image.depth() == CV_16U;
   if (!depth_known || (image.channels() != 1 && image.channels() != 3 && image.channels() != 4)) {
     throw Error(path.string() + " is not an 8- or 16-bit grey or colour image; convert it first.");
@@ -292,7 +292,8 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
   const std::string extension = extension_of(path);
   if (extension == ".pfm") return read_pfm(path, read_bytes(path));
   if (extension == ".exr") return read_exr(path, read_bytes(path));
-  const cv::Mat image = decode(path);
+  const cv::Mat image =
+      decode(path, "a map", "a 32-bit float TIFF or PFM, OpenEXR, or a 16-bit PNG");
   cv::Mat map;
   if (image.type() == CV_16UC1) {
     image.convertTo(map, CV_32F, 1 / png_scale);

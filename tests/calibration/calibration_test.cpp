@@ -213,20 +213,27 @@ TEST(Kalibr, CommentsMayNameOtherFormats) {
 TEST(Kalibr, ReadsTheTimesOfTheImu) {
   const TemporaryFolder folder;
   std::string text = replaced(kalibr_text, "cam1:\n", "cam1:\n  timeshift_cam_imu: -0.0302\n");
-  const Rig rig = read_calibration(folder.write("chain.yaml", text)).rig;
-  EXPECT_EQ(rig.views[0].imu_time_offset, 0);
-  EXPECT_EQ(rig.views[1].imu_time_offset, -0.0302);
-  write_kalibr(folder / "again.yaml", rig);
-  EXPECT_EQ(read_calibration(folder / "again.yaml").rig.views[1].imu_time_offset, -0.0302);
+  const Rig of_one = read_calibration(folder.write("chain.yaml", text)).rig;
+  for (const View& view : of_one.views) EXPECT_EQ(view.imu_time_offset, -0.0302) << view.name;
+  write_basalt(folder / "one.json", of_one);
+  text = replaced(text, "cam0:\n", "cam0:\n  timeshift_cam_imu: 0\n");
+  Rig rig = read_calibration(folder.write("chain.yaml", text)).rig;
+  for (const char* file : {"again.yaml", "and_again.yaml"}) {
+    EXPECT_EQ(rig.views[0].imu_time_offset, 0);
+    EXPECT_EQ(rig.views[1].imu_time_offset, -0.0302);
+    write_kalibr(folder / file, rig);
+    rig = read_calibration(folder / file).rig;
+  }
   EXPECT_NE(test::error_of([&] {
               write_basalt(folder / "one.json", rig);
             }).find("cam0 and cam1 by times that differ by more than a millisecond"),
             std::string::npos);
-  for (const char* wrong : {"4000", ".nan", "soon"}) {
+  for (const auto& [wrong, named] :
+       {std::pair("4000", "ahead by 4000"), {".nan", "cam1"}, {"soon", "cam1"}}) {
     text = replaced(kalibr_text, "cam1:\n",
                     std::string("cam1:\n  timeshift_cam_imu: ") + wrong + "\n");
     EXPECT_NE(
-        test::error_of([&] { read_calibration(folder.write("chain.yaml", text)); }).find("cam1"),
+        test::error_of([&] { read_calibration(folder.write("chain.yaml", text)); }).find(named),
         std::string::npos)
         << wrong;
   }
@@ -893,6 +900,9 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
          "T_imu_cam has a quaternion of length 2 instead of 1; scale qx, qy, qz and qw alike.");
   expect(replaced(basalt_text, "[512, 510], ", ""), "length");
   expect(replaced(opencv_text, "K1:", "A1:"), "K1");
+  expect(replaced(opencv_text, "   dt: d", "   : d"), "OpenCV cannot read it (");
+  expect(replaced(kalibr_text, "resolution: [512,", "resolution: [-512,"),
+         "The key resolution has -512; give whole numbers of pixels");
   expect(replaced(opencv_text, "T: !!", "U: !!"), "translation");
   expect(replaced(opencv_text, "[ 1., 0., 0., 0., 1.", "[ 1., 0., 0., 0., 2."), "rigid");
   expect(replaced(opencv_text, "[ -0.125, 0., 0. ]", "[ 0., 0., 0. ]"), "baseline");

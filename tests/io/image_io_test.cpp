@@ -120,6 +120,9 @@ TEST(Maps, UnsupportedOnesAreRefused) {
   EXPECT_THROW(write_map(folder / "a.jpg", random_map(CV_32FC1)), Error);
   EXPECT_THROW(write_map(folder / "a.png", random_map(CV_32FC3)), Error);
   EXPECT_THROW(write_map(folder / "a.tiff", random_map(CV_64FC1)), Error);
+  folder.write("text.tiff", "no map");
+  EXPECT_NE(error_of([&] { read_map(folder / "text.tiff"); }).find("is not a map that can be read"),
+            std::string::npos);
   write_image(folder / "grey.png", cv::Mat(4, 4, CV_8UC1, cv::Scalar(3)));
   EXPECT_NE(error_of([&] { read_map(folder / "grey.png"); }).find("grey.png"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.png"));
