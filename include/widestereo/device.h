@@ -55,7 +55,8 @@ class Device {
   static Device open(const Name& device) {
     return open(DeviceRequest{.device = device});
   }
-  /// All devices of this machine, best first, the CPU last. Never throws for a missing driver.
+  /// All devices of this machine, best first: the CPU after all that can be used, then those that
+  /// cannot. Never throws for a missing driver.
   static std::vector<DeviceInfo> list();
   /// Why list() has no device of this kind, one sentence; empty if it has.
   static std::string why_none(DeviceKind kind);

@@ -24,7 +24,8 @@ bool one_runs_on(const std::string& architecture, int major, int minor) {
   if (!rest.empty() && rest[0] == 'a') return number == 10 * major + minor;
   const bool same_major = number / 10 == major && number % 10 <= minor;
   const bool older = number <= 10 * major + minor;
-  if (rest.ends_with("-real")) return same_major;
+  // "100f": those of one family.
+  if (rest.ends_with("-real") || (!rest.empty() && rest[0] == 'f')) return same_major;
   return older;  // PTX, which plain numbers include
 }
 

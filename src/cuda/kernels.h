@@ -34,7 +34,7 @@ constexpr unsigned short lowest_half_bits = 0xfbff;
 
 /// What a kernel sees besides its pixel: the one argument of every kernel.
 struct Context {
-  /// In device memory: 14 KB exceed the 4 KiB of arguments that CUDA allows before 12.1.
+  /// In device memory: 15 KiB exceed the 4 KiB of arguments that CUDA allows before 12.1.
   const MatchParameters* parameters;
   PassParameters pass;
   ViewMemory views[MAX_VIEWS];

@@ -51,7 +51,8 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, int image
                     single(options.max_cost), single(options.min_parallax)};
   p.acceptance = {single(options.min_confidence), 0, 0, 0};
   const auto inverse_scale = [](double grey_levels) {
-    return grey_levels > 0 ? static_cast<float>(255 / grey_levels) : 0.0f;
+    constexpr double most = 1e6;  // where all but equal intensities weigh nothing; never infinite
+    return grey_levels > 0 ? static_cast<float>(std::min(255 / grey_levels, most)) : 0.0f;
   };
   p.support = {inverse_scale(options.weight_scale), inverse_scale(options.regression_scale),
                single(options.ambiguity_margin), single(options.far_preference)};

@@ -82,6 +82,10 @@ TEST(CudaArchitectures, RunWhereTheyWereBuiltFor) {
   EXPECT_TRUE(runs_on("86-real", 8, 9));
   EXPECT_FALSE(runs_on("86-real", 9, 0));
   EXPECT_TRUE(runs_on("75", 12, 0));
+  for (const char* of_family : {"100f", "100f-real", "100f-virtual"}) {
+    EXPECT_TRUE(runs_on(of_family, 10, 3)) << of_family;
+    EXPECT_FALSE(runs_on(of_family, 12, 0)) << of_family;
+  }
   EXPECT_TRUE(runs_on("75;80", 8, 6));
   EXPECT_TRUE(runs_on("75-virtual", 8, 6));
   EXPECT_FALSE(runs_on("75-virtual", 7, 0));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <random>
 
 #include "kernel_fixture.h"
@@ -34,16 +35,17 @@ bool sample(const cv::Mat_<float>& image, const Eigen::Vector2d& u, double& valu
 }
 
 /// The definition, term by term: intersect every ray of the patch with the plane, move the point to
-/// the source, project it, sample, and take the normalised correlation. Returns 2 where invalid.
+/// the source, project it, sample, and take the normalised correlation, weighted by likeness to the
+/// centre. Returns 2 where invalid.
 double literal_cost(KernelFixture& fixture, int reference, int source, ivec2 pixel,
-                    const Eigen::Vector3d& m, int radius, double min_visible) {
+                    const Eigen::Vector3d& m, const Options& options) {
+  const int radius = options.window_radius;
   const Rig& rig = fixture.rig();
   const Eigen::Isometry3d motion = source_from_reference(rig.views[source], rig.views[reference]);
   const cv::Mat_<float> a_image = fixture.view(reference).image();
   const cv::Mat_<float> b_image = fixture.view(source).image();
   if (m.dot(motion.inverse().translation()) >= 1) return 2;
-  std::vector<double> a_values;
-  std::vector<double> b_values;
+  std::vector<double> weights, a_values, b_values;
   int of_patch = 0;
   bool centre_seen = false;
   for (int dy = -radius; dy <= radius; ++dy) {
@@ -59,25 +61,33 @@ double literal_cost(KernelFixture& fixture, int reference, int source, ivec2 pix
       double b = 0;
       if (!project(rig.views[source].camera, motion * point, u) || !sample(b_image, u, b)) continue;
       if (dx == 0 && dy == 0) centre_seen = true;
+      const float difference = 255 * (a_image(y, x) - a_image(pixel.y, pixel.x));
+      weights.push_back(
+          options.weight_scale == 0
+              ? 1
+              : std::pow(1 + std::abs(static_cast<double>(difference)) / (8 * options.weight_scale),
+                         -8));
       a_values.push_back(static_cast<double>(a_image(y, x)));
       b_values.push_back(b);
     }
   }
-  if (!centre_seen || static_cast<double>(a_values.size()) < min_visible * of_patch) return 2;
-  const double n = static_cast<double>(a_values.size());
+  if (!centre_seen || static_cast<double>(a_values.size()) < options.min_visible * of_patch) {
+    return 2;
+  }
+  const double n = std::accumulate(weights.begin(), weights.end(), 0.0);
   double mean_a = 0;
   double mean_b = 0;
   for (std::size_t i = 0; i < a_values.size(); ++i) {
-    mean_a += a_values[i] / n;
-    mean_b += b_values[i] / n;
+    mean_a += weights[i] * a_values[i] / n;
+    mean_b += weights[i] * b_values[i] / n;
   }
   double aa = 0;
   double bb = 0;
   double ab = 0;
   for (std::size_t i = 0; i < a_values.size(); ++i) {
-    aa += (a_values[i] - mean_a) * (a_values[i] - mean_a);
-    bb += (b_values[i] - mean_b) * (b_values[i] - mean_b);
-    ab += (a_values[i] - mean_a) * (b_values[i] - mean_b);
+    aa += weights[i] * (a_values[i] - mean_a) * (a_values[i] - mean_a);
+    bb += weights[i] * (b_values[i] - mean_b) * (b_values[i] - mean_b);
+    ab += weights[i] * (a_values[i] - mean_a) * (b_values[i] - mean_b);
   }
   return 1 - ab / std::sqrt(aa * bb);
 }
@@ -98,6 +108,8 @@ struct Case {
   PatchWarp warp;
   int reference;
   double tolerance_p99;
+  double weight_scale = 0;
+  double min_visible = 0.6;
 };
 
 class PatchCost : public ::testing::TestWithParam<Case> {};
@@ -107,6 +119,8 @@ TEST_P(PatchCost, AgreesWithTheLiteralDefinition) {
   options.window_radius = 4;
   options.warp = GetParam().warp;
   options.min_texture = 0;
+  options.weight_scale = GetParam().weight_scale;
+  options.min_visible = GetParam().min_visible;
   const int reference = GetParam().reference;
   KernelFixture fixture(fisheye_rig(128), options);
   fixture.set_reference(reference);
@@ -124,7 +138,7 @@ TEST_P(PatchCost, AgreesWithTheLiteralDefinition) {
     const Eigen::Vector3f mf = m.cast<float>();
     const float cost =
         kernel::cpu::patch_cost(fixture.context(), pixel, vec3(mf.x(), mf.y(), mf.z()));
-    const double expected = literal_cost(fixture, reference, 1 - reference, pixel, m, 4, 0.6);
+    const double expected = literal_cost(fixture, reference, 1 - reference, pixel, m, options);
     if ((cost >= 2) != (expected >= 2)) {
       ++validity_differs;
       continue;
@@ -145,8 +159,23 @@ TEST_P(PatchCost, AgreesWithTheLiteralDefinition) {
 INSTANTIATE_TEST_SUITE_P(
     Warps, PatchCost,
     ::testing::Values(Case{PatchWarp::exact, 0, 2e-4}, Case{PatchWarp::exact, 1, 2e-4},
+                      Case{PatchWarp::exact, 0, 2e-4, 12, 0.9},
                       // At 128 px the lens bends four times as much per pixel as at 512 px.
                       Case{PatchWarp::affine, 0, 0.2}, Case{PatchWarp::quadratic, 0, 0.03}));
+
+TEST(PatchWeights, OfTheSmallestScalesGiveCosts) {
+  Options options;
+  options.min_texture = 0;
+  for (const double scale : {std::numeric_limits<double>::denorm_min(), 1e-37, 1e-5}) {
+    options.weight_scale = scale;
+    KernelFixture fixture(fisheye_rig(64), options);
+    fixture.set_reference(0);
+    // False for NaN.
+    EXPECT_LE(kernel::cpu::patch_cost(fixture.context(), {32, 32}, vec3(0, 0, 0.5f)),
+              NO_INFORMATION_COST)
+        << scale;
+  }
+}
 
 /// How far (pixels) a mapped patch lies from the exact warp: root mean square of its samples, and
 /// their mean.

@@ -79,6 +79,12 @@ TEST(WarmSchedule, MotionChangesParametersOnly) {
       std::memcmp(&moved.parameters.pairs[1], &still.parameters.pairs[1], sizeof(kernel::ViewPair)),
       0);
   ASSERT_EQ(moved.dispatches.size(), still.dispatches.size());
+  for (std::size_t i = 0; i < still.dispatches.size(); ++i) {
+    const Dispatch &a = moved.dispatches[i], &b = still.dispatches[i];
+    EXPECT_TRUE(a.kernel == b.kernel && a.over == b.over && a.views == b.views &&
+                std::memcmp(&a.pass, &b.pass, sizeof a.pass) == 0)
+        << "dispatch " << i;
+  }
 }
 
 }  // namespace
