@@ -278,15 +278,22 @@ class Reconstruction {
   fs::path folder_of(std::size_t image) const {
     return folders_.folder() / images_.views[image].name;
   }
-  cv::Mat distance_of(std::size_t image) const {
-    return ws::read_map(folder_of(image) / "distance_accepted0.tiff");
-  }
-  ws::ViewMaps maps_of(std::size_t image) const {
+  /// Of an image's result, perhaps of an earlier run.
+  cv::Mat map_of(std::size_t image, const char* file) const {
     const fs::path folder = folder_of(image);
+    try {
+      return ws::read_map(folder / file);
+    } catch (const ws::Error&) {
+      throw ws::Error("Cannot read " + (folder / file).string() + "; remove " + folder.string() +
+                      " and run again, so that its image is matched again.");
+    }
+  }
+  cv::Mat distance_of(std::size_t image) const { return map_of(image, "distance_accepted0.tiff"); }
+  ws::ViewMaps maps_of(std::size_t image) const {
     return {.distance = distance_of(image),
-            .normals = ws::read_map(folder / "normals0.tiff"),
+            .normals = map_of(image, "normals0.tiff"),
             .image = images_.read(image),
-            .confidence = ws::read_map(folder / "confidence0.tiff")};
+            .confidence = map_of(image, "confidence0.tiff")};
   }
 
   void fuse() {

@@ -245,6 +245,14 @@ TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
   ASSERT_EQ(run(reconstruct() + "--max-cost 0.3 --overwrite").exit_code, 0);
 }
 
+TEST_F(ReconstructCommand, DamagedMapsOfAnEarlierRunAreNamedWithTheRemedy) {
+  ASSERT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
+  folder_.write("out/right/1.png/normals0.tiff", "");
+  expect_error(reconstruct() + "--min-views 1", "out/right/1.png/normals0.tiff; remove ");
+  std::filesystem::remove_all(folder_ / "out/right/1.png");
+  EXPECT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
+}
+
 TEST_F(ReconstructCommand, LittleThatIsAcceptedGivesAHint) {
   const std::string hint = "Little was accepted: check the poses";
   const Outcome outcome = run(reconstruct() + "--max-cost 0.01 --min-views 1");
