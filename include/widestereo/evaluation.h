@@ -44,9 +44,9 @@ constexpr double interior_edge_clearance = 8;  ///< pixels
 /// Scores over one set of pixels. Shares lie in [0, 1]; a pixel without prediction counts as bad.
 /// Shares, means and medians over no pixel at all are NaN (null in JSON), but for completeness.
 struct RegionScores {
-  /// "all", where occlusion is known "non-occluded", "0-30 deg", "30-60 deg", "60-90 deg", ">90
-  /// deg", and where there is an image "textured" and "textured interior" (textured, and not at an
-  /// edge of the true scene).
+  /// "all", where occlusion is known "non-occluded", then by angle "0-30 deg", "30-60 deg",
+  /// "60-90 deg" and ">90 deg", and where there is an image "textured" and "textured interior"
+  /// (textured, and not at an edge of the true scene).
   std::string region;
   long pixels = 0;          ///< pixels scored
   double completeness = 0;  ///< share with a prediction, 0 of no pixel
