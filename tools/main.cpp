@@ -35,6 +35,15 @@ std::string unknown_command(const CLI::App& app) {
   return app.remaining().front() + " is no command; `widestereo" + path + " --help` lists them.";
 }
 
+/// The option that was given more than once though it takes one word, empty if none was.
+std::string repeated_option(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_items_expected_max() == 1 && option->count() > 1) return option->get_name();
+  }
+  const std::vector<CLI::App*> parsed = app.get_subcommands();
+  return parsed.empty() ? "" : repeated_option(*parsed.front());
+}
+
 int report_lack_of_memory() {
   say("Not enough memory; use smaller images.");
   return 1;
@@ -70,6 +79,11 @@ int run(int argc, char** argv) {
     const std::string unknown = unknown_command(app);
     if (unknown.empty()) return report(app, error);
     say(unknown);
+    return error.get_exit_code();
+  } catch (const CLI::ArgumentMismatch& error) {
+    const std::string repeated = repeated_option(app);
+    if (repeated.empty()) return report(app, error);
+    say(repeated + " is given more than once; give it once.");
     return error.get_exit_code();
   } catch (const CLI::ConversionError& error) {
     // Words have been found to be such numbers, or true or false: just a number's range is left.

@@ -106,7 +106,8 @@ ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
       pose_settings.read(rig, settings.calibration, frames, all).poses;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     ws::View& view = rig.views[i];
-    view.name = frames[i].name;
+    // Cameras may have taken their images at the same time, under the same name.
+    view.name = rig_settings.views.empty() ? frames[i].name : frames[i].name + "/" + view.name;
     view.world_from_camera = poses.front().inverse() * poses[i] * view.world_from_camera;
   }
   ws::validate(rig, pose_settings.file);

@@ -116,7 +116,7 @@ void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& 
   for (std::size_t i = 0; i < calibrated.size(); ++i) {
     const ws::Camera& camera = calibrated[i].camera;
     if (limited[i] || !looks_for_rim_of(camera)) continue;
-    // One camera may have taken several views.
+    // One camera may have taken several views, or cameras of one kind share their calibration.
     std::vector<std::size_t> of_camera;
     std::vector<cv::Mat> seen;
     for (std::size_t j = i; j < calibrated.size(); ++j) {
@@ -130,7 +130,8 @@ void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& 
       if (rim) rig.views[j].camera.max_theta = rim->usable;
     }
     if (!rim) continue;
-    say(rig.views[i].name + (of_camera.size() > 1 ? ", like the other images of its camera," : "") +
+    say(rig.views[i].name +
+        (of_camera.size() > 1 ? ", like all images that are calibrated alike," : "") +
         ws::formatted(" is black from %.1f degrees off the axis on and matched up to %.1f "
                       "(--max-theta 180 matches all).",
                       rim->dark * ws::degrees_per_radian, rim->usable * ws::degrees_per_radian));

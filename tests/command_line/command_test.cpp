@@ -163,6 +163,22 @@ TEST_F(MovingCamera, WithKnownPosesIsARig) {
             0.97 * cv::countNonZero(distance_in("out") > 0));
 }
 
+TEST_F(MovingCamera, ImagesOfOneTimeAreNamedByTheirCameras) {
+  const std::string time = "1403636579.763555";
+  for (const char* folder : {"a", "b"}) fs::create_directory(file(folder));
+  fs::copy_file(file("left.png"), file("a/" + time + ".png"));
+  fs::copy_file(file("right.png"), file("b/" + time + ".png"));
+  folder_.write("poses.txt", time + " 0 0 0 0 0 0 1\n");
+  const Outcome outcome =
+      run("depth " + file("a/" + time + ".png") + " " + file("b/" + time + ".png") + " -c " +
+          file("calib.yaml") + " --views 0,1 --poses " + file("poses.txt") + " -o " + file("out") +
+          quick + "--max-theta 90 ");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json record = nlohmann::json::parse(bytes_of("out/result.json"));
+  EXPECT_EQ(record["views"][0]["name"], time + "/cam0");
+  EXPECT_EQ(record["views"][1]["name"], time + "/cam1");
+}
+
 TEST_F(MovingCamera, NeedsAPoseForEachImage) {
   const std::string first = "0 0 0 0 0 0 0 1\n";
   expect_error(depth_at(first, "out"), "has 1 poses for 2 frames without time stamps");
@@ -280,6 +296,12 @@ TEST_F(RefusedWords, NoneIsEmpty) {
   expect_refusal("depth '' " + file("right.png") + " -c x -o " + file("out"),
                  "images: the value is empty");
   expect_refusal("benchmark --devices cpu --sizes 64 -o ''", "--output: the value is empty");
+}
+
+TEST_F(RefusedWords, AnOptionOfOneWordIsGivenOnce) {
+  expect_refusal(depth_of("left.png", "right.png") + "--preset fast --preset paper",
+                 "--preset is given more than once; give it once.");
+  expect_refusal(sequence() + "--seed 1 --first 2 --seed 2", "--seed is given more than once");
 }
 
 TEST_F(RefusedWords, WholeNumbersAreDecimalDigits) {
