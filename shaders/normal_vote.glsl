@@ -22,8 +22,7 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
     ivec4 size = PARAMETERS.cameras[REFERENCE].size;
     float own = inverse_distance_of(held, ray);
-    float scale = measure.y / VOTE_DISPLACEMENT;
-    float own_place = scale * own;
+    float scale = PER_VOTE_DISPLACEMENT * measure.y;
     vec3 candidates[NORMAL_CANDIDATES];
     float support[NORMAL_CANDIDATES];
     UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {
@@ -51,7 +50,8 @@ FN void vote_normal_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         vec4 plane = hypothesis_at(CONTEXT REFERENCE, q);
         if (plane.w >= INVALID_COST) continue;
         vec3 m = vec3(plane.x, plane.y, plane.z);
-        float weight = support_between(scale * dot(m, ray), own_place) /
+        // Not as the difference of both places: Mesa would factor the scale out.
+        float weight = support_over(scale * (dot(m, ray) - own)) /
                        remoteness_of_voter(CONTEXT q, dx, dy, fall_off, measure.w, inverse_scale);
         vec3 normal = (1.0f / length(m)) * m;
         UNROLL for (int i = 0; i < NORMAL_CANDIDATES; ++i) {

@@ -3,8 +3,10 @@
 // over the weaker texture beside it. Most of the pixels that look alike around there still lie on the right one, and
 // the middle of the patch, too small to hold the edge, tells the candidates apart where it has texture of its own.
 
-// Displacement (source pixels) from which on a plane does not support another.
+// Displacement (source pixels) from which on a plane does not support another, and its inverse: Mesa multiplies with that
+// instead of dividing.
 #define VOTE_DISPLACEMENT 0.4f
+#define PER_VOTE_DISPLACEMENT 2.5f
 // Planes nearer than this to the pixel's own do not stand, so that curved surfaces stay curved.
 #define SAME_DISPLACEMENT 0.06f
 // Displacement up to which candidates are the same rival.
@@ -36,12 +38,14 @@ FN ivec2 vote_candidate_at(CONTEXT_ARGUMENT ivec2 pixel, int i) {
   return ivec2(pixel.x + (k % 3 - 1) * reach, pixel.y + (k / 3 - 1) * reach);
 }
 
-// How much one plane supports another, from where they put the pixel's point, in units of VOTE_DISPLACEMENT.
-FN float support_between(float place, float candidate) {
-  float difference = place - candidate;
+// How much one plane supports another, by how far apart they put the pixel's point, in units of VOTE_DISPLACEMENT.
+FN float support_over(float difference) {
   float agreement = saturate_below_one(1.0f - difference * difference);
   return agreement * agreement;
 }
+
+// The same, from where they put it.
+FN float support_between(float place, float candidate) { return support_over(place - candidate); }
 
 // By how much less than the pixel itself one counts at q, (dx, dy) away: from 1 on. `fall_off`: per squared pixel.
 FN float remoteness_of_voter(CONTEXT_ARGUMENT ivec2 q, int dx, int dy, float fall_off, float intensity,
@@ -148,7 +152,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int source = checked_source(CONTEXT pixel, ray, own, velocity);
     float speed = length(velocity);
     // Places along the epipolar curve, in units of VOTE_DISPLACEMENT.
-    float scale = speed / VOTE_DISPLACEMENT;
+    float scale = PER_VOTE_DISPLACEMENT * speed;
     float own_place = scale * own;
     float candidates[VOTE_CANDIDATES];
     float support[VOTE_CANDIDATES];
