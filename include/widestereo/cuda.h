@@ -30,7 +30,7 @@ struct CudaWarmStart {
   /// As WarmStart::now_from_previous; left out where unknown.
   std::optional<Eigen::Isometry3d> now_from_previous = std::nullopt;
   /// The first three rows of the same matrix, row after row (12 values), in device memory, instead:
-  /// read when the work runs.
+  /// read when the work runs. Aligned as double.
   const double* device_now_from_previous = nullptr;
   /// As WarmStart::frame. Left out: counted on the device, one more than that of the matcher's
   /// warm start that ran before, from 1 on.
@@ -45,21 +45,23 @@ class CudaMatcher {
   /// The device and context that are current in the calling thread.
   static constexpr int current_device = -1;
 
-  /// Allocates all memory, compiles nothing and waits for the device. With `current_device` the
-  /// same context must be current in every later call, the destructor included; with an ordinal of
-  /// the CUDA runtime its primary context is used and the thread's current device is left as it
+  /// Allocates all memory and waits for the device; compiles nothing, unless the device is newer
+  /// than those that the library was built for: its driver then does, once. With `current_device`
+  /// the same context must be current in every later call, the destructor included; with an ordinal
+  /// of the CUDA runtime its primary context is used and the thread's current device is left as it
   /// was; where contexts made by cuCtxCreate() may be current, give `current_device`. Throws Error
   /// when the rig, the options or the device do not do, or CUDA is not in this build.
   CudaMatcher(const Rig& rig, const Options& options, int device = current_device);
-  /// The work enqueued must have finished.
+  /// The work enqueued must have finished, and graphs that captured some must not be launched
+  /// afterwards: they use the matcher's memory. Assigning another matcher does the same.
   ~CudaMatcher();
   CudaMatcher(CudaMatcher&&) noexcept;
   CudaMatcher& operator=(CudaMatcher&&) noexcept;
 
   /// Enqueues one match: reads the images, one for each view, and writes the maps, likewise.
   /// Neither waits nor allocates device memory, and may be captured into a graph of the
-  /// application's. Throws Error for images or maps that do not fit; where nothing overlaps, all
-  /// costs are 2.
+  /// application's. Throws Error for images or maps that do not fit, and for the default stream
+  /// while a blocking stream captures; where nothing overlaps, all costs are 2.
   void enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                CUstream_st* stream);
 

@@ -405,13 +405,16 @@ std::size_t CudaBackend::prepare(const Schedule& schedule) {
   return prepared_.size() - 1;
 }
 
+bool CudaBackend::captures(cudaStream_t stream) const {
+  cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
+  check(cudaStreamIsCapturing(stream, &status), "use the stream");
+  return status != cudaStreamCaptureStatusNone;
+}
+
 void CudaBackend::enqueue(std::size_t prepared, cudaStream_t stream) {
   const CurrentDevice current = make_current();
   const Prepared& match = prepared_.at(prepared);
-  cudaStreamCaptureStatus status = cudaStreamCaptureStatusNone;
-  // The default stream cannot capture, and must not be asked while another one does.
-  if (stream != nullptr) check(cudaStreamIsCapturing(stream, &status), "be asked for captures");
-  if (status == cudaStreamCaptureStatusNone) {
+  if (!captures(stream)) {
     check(cudaGraphLaunch(match.graph.get(), stream), "launch a match");
     return;
   }

@@ -39,6 +39,9 @@ class CudaBackend final : public Backend {
 
   /// Makes a schedule ready for enqueue(), with parameters of its own; waits. Returns its number.
   std::size_t prepare(const Schedule& schedule);
+  /// Whether the stream captures; throws Error where it must not be used, as the default stream
+  /// while another one captures: work enqueued there would end that capture.
+  bool captures(cudaStream_t stream) const;
   /// Enqueues a prepared schedule; waits for nothing and allocates no device memory. Where the
   /// stream captures, the kernels become nodes of what it captures.
   void enqueue(std::size_t prepared, cudaStream_t stream);

@@ -4,6 +4,7 @@
 #include <cuda_runtime_api.h>
 
 #include "cuda/architectures.h"
+#include "cuda/convert_maps.h"
 #include "cuda/cuda_backend.h"
 #include "cuda/peaks.h"
 #include "text/hexadecimal.h"
@@ -103,6 +104,8 @@ class CudaDevice final : public Device::Implementation {
     info = describe_cuda_device(index);
     const CurrentDevice current(index, info.name);
     check(cudaFree(nullptr), info.name, "be started");  // makes the context
+    // All files are compiled for the same devices: what runs none of these runs no kernel.
+    check(load_conversions(), info.name, "load its kernels");
   }
 
   std::unique_ptr<Backend> make_backend(const std::vector<cv::Size>& sizes,

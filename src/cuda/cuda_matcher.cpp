@@ -25,6 +25,12 @@ void require_map(const CudaMap<T>& map, std::size_t values, const std::string& w
   require_data_rows(map.data, map.pitch, sizeof(T), values * sizeof(T), what);
 }
 
+void require_aligned(const double* motion) {
+  if (reinterpret_cast<std::uintptr_t>(motion) % alignof(double) == 0) return;
+  throw Error("The pointer to the motion is no multiple of " + std::to_string(alignof(double)) +
+              " bytes, as the device needs it; align it.");
+}
+
 DeviceInfo cuda_device() {
   DeviceInfo info;
   info.kind = DeviceKind::cuda;
@@ -55,13 +61,15 @@ class CudaMatcher::Implementation {
     cold_ = backend_.prepare(setup_.schedule);
     warm_ = backend_.prepare(setup_.warm_schedule);
     const CudaTarget& target = backend_.target();
-    const CurrentDevice current(target.ordinal, target.name);
+    const CurrentDevice current = make_current();
     check(load_conversions(), target.name, "load its kernels");
   }
 
   void enqueue(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                cudaStream_t stream) {
     require_fitting(images, maps);
+    const CurrentDevice current = make_current();
+    backend_.captures(stream);  // before anything is enqueued that would end another one's capture
     enqueue_prepared(cold_, images, maps, stream);
     holds_planes_ = true;
   }
@@ -74,8 +82,10 @@ class CudaMatcher::Implementation {
           "before.");
     }
     require_fitting(images, maps);
+    require_aligned(start.device_now_from_previous);
+    const CurrentDevice current = make_current();
+    backend_.captures(stream);
     const CudaTarget& target = backend_.target();
-    const CurrentDevice current(target.ordinal, target.name);
     check(start_frame(frame_start(start), backend_.parameters(warm_), stream), target.name,
           "start a frame");
     enqueue_prepared(warm_, images, maps, stream);
@@ -84,10 +94,11 @@ class CudaMatcher::Implementation {
   std::size_t device_bytes() const { return backend_.device_bytes(); }
 
  private:
+  CurrentDevice make_current() const { return {backend_.target().ordinal, backend_.target().name}; }
+
   void enqueue_prepared(std::size_t prepared, std::span<const CudaImage> images,
                         std::span<const CudaViewMaps> maps, cudaStream_t stream) {
     const CudaTarget& target = backend_.target();
-    const CurrentDevice current(target.ordinal, target.name);
     for (std::size_t i = 0; i < images.size(); ++i) {
       const int view = static_cast<int>(i);
       check(import_image(images[i], backend_.memory(view), backend_.size(view).height, stream),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "cuda/device_image.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "cuda/kernels.h"
@@ -12,10 +13,14 @@ namespace {
 template <class Texel>
 void fill(void* memory, std::size_t count, Texel value, cudaStream_t stream,
           const std::string& device) {
-  const std::vector<Texel> values(count, value);
-  check(
-      cudaMemcpyAsync(memory, values.data(), count * sizeof(Texel), cudaMemcpyHostToDevice, stream),
-      device, "clear the images");
+  constexpr std::size_t most_at_once = 1 << 18;  // of the host's memory
+  const std::vector<Texel> values(std::min(count, most_at_once), value);
+  for (std::size_t done = 0; done < count; done += values.size()) {
+    const std::size_t bytes = std::min(values.size(), count - done) * sizeof(Texel);
+    check(cudaMemcpyAsync(static_cast<Texel*>(memory) + done, values.data(), bytes,
+                          cudaMemcpyHostToDevice, stream),
+          device, "clear the images");
+  }
   check(cudaStreamSynchronize(stream), device, "clear the images");
 }
 

@@ -26,7 +26,8 @@ class SelectedDevice {
     changed_ = previous_ != ordinal;
   }
   ~SelectedDevice() {
-    if (changed_) cudaSetDevice(previous_);
+    // The application's next question must not get an error of this.
+    if (changed_ && cudaSetDevice(previous_) != cudaSuccess) cudaGetLastError();
   }
   SelectedDevice(const SelectedDevice&) = delete;
   SelectedDevice& operator=(const SelectedDevice&) = delete;

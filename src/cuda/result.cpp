@@ -18,6 +18,12 @@ std::string explain(cudaError_t result) {
       return "this build has no kernels for its architecture; build with CMAKE_CUDA_ARCHITECTURES "
              "for it, or update the driver" +
              name + ".";
+    case cudaErrorCallRequiresNewerDriver:
+      return "the NVIDIA driver is too old for this build; update the driver" + name + ".";
+    case cudaErrorStreamCaptureImplicit:
+      return "another thread captures on a stream that waits for the default stream; use a stream "
+             "of your own, or capture on a non-blocking one" +
+             name + ".";
     case cudaErrorDevicesUnavailable:
       return "it is busy or its compute mode forbids use; close the program that holds it or set "
              "the mode with nvidia-smi -c 0" +

@@ -37,6 +37,7 @@ struct CUstream_st {
   std::deque<Work> queue;
   bool blocking = true;
   CUgraph_st* capturing = nullptr;
+  bool capture_is_lost = false;
   std::thread::id capturing_thread;
   cudaStreamCaptureMode mode = cudaStreamCaptureModeGlobal;  // of that capture
 };
@@ -123,10 +124,18 @@ cudaError_t step_outside_capture() {
   return this_thread_captures() || captures_forbid_this_thread() ? cudaErrorStreamCaptureUnsupported
                                                                  : step();
 }
+/// Ends all captures on blocking streams where the default stream is used meanwhile.
+cudaError_t end_captures_for(cudaStream_t stream) {
+  if (stream != nullptr || !a_blocking_stream_captures()) return cudaSuccess;
+  for (CUstream_st* other : streams()) {
+    if (other->blocking && other->capturing != nullptr) other->capture_is_lost = true;
+  }
+  return cudaErrorStreamCaptureImplicit;
+}
 /// Likewise, of one that uses the default stream.
 cudaError_t step_on(cudaStream_t stream) {
-  return stream == nullptr && a_blocking_stream_captures() ? cudaErrorStreamCaptureUnsupported
-                                                           : step_outside_capture();
+  const cudaError_t lost = end_captures_for(stream);
+  return lost != cudaSuccess ? lost : step_outside_capture();
 }
 
 void enqueue(cudaStream_t stream, Work work) {
@@ -475,7 +484,7 @@ cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode mo
   return cudaSuccess;
 }
 cudaError_t cudaStreamIsCapturing(cudaStream_t stream, cudaStreamCaptureStatus* status) {
-  if (stream == nullptr && a_blocking_stream_captures()) return cudaErrorStreamCaptureUnsupported;
+  if (stream == nullptr && a_blocking_stream_captures()) return cudaErrorStreamCaptureImplicit;
   *status = stream != nullptr && stream->capturing != nullptr ? cudaStreamCaptureStatusActive
                                                               : cudaStreamCaptureStatusNone;
   return step();
@@ -483,7 +492,9 @@ cudaError_t cudaStreamIsCapturing(cudaStream_t stream, cudaStreamCaptureStatus* 
 cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
   *graph = std::exchange(stream->capturing, nullptr);
   if (*graph == nullptr) return cudaErrorInvalidValue;
-  if (const cudaError_t error = step()) {
+  cudaError_t error = step();
+  if (std::exchange(stream->capture_is_lost, false)) error = cudaErrorStreamCaptureInvalidated;
+  if (error != cudaSuccess) {
     cudaGraphDestroy(std::exchange(*graph, nullptr));
     return error;
   }
@@ -536,6 +547,7 @@ cudaError_t cudaGraphInstantiateWithFlags(cudaGraphExec_t* exec, cudaGraph_t gra
 cudaError_t cudaGraphUpload(cudaGraphExec_t, cudaStream_t stream) { return step_on(stream); }
 cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
   if (resolve(stream)->capturing != nullptr) return cudaErrorStreamCaptureUnsupported;
+  if (const cudaError_t lost = end_captures_for(stream)) return lost;
   if (const cudaError_t error = step()) return error;
   for (const std::size_t number : order_of(exec->nodes, emulation().backwards)) {
     const CUgraphNode_st& node = exec->nodes[number];
@@ -588,11 +600,13 @@ cudaError_t cudaEventElapsedTime(float* milliseconds, cudaEvent_t start, cudaEve
 }
 
 cudaError_t cudaFuncGetAttributes(cudaFuncAttributes*, const void*) {
+  if (!emulation().has_kernels) return cudaErrorNoKernelImageForDevice;
   return step_outside_capture();
 }
 cudaError_t cudaLaunchKernel(const void* function, dim3 grid, dim3 block, void** arguments,
                              std::size_t, cudaStream_t stream) {
   Work work;
+  if (const cudaError_t lost = end_captures_for(stream)) return lost;
   if (const cudaError_t error = bind_launch(function, grid, block, arguments, work)) return error;
   enqueue(stream, std::move(work));
   return cudaSuccess;

@@ -18,6 +18,7 @@ struct Emulation {
   int driver_version = 12040;
   cudaError_t count_error = cudaSuccess;
   int compute_mode = cudaComputeModeDefault;
+  bool has_kernels = true;  ///< for these devices
   int major = 9;
   bool time_limit = false;
   std::size_t memory = std::size_t{1} << 30;

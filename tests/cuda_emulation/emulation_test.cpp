@@ -117,6 +117,47 @@ TEST_F(CudaEmulation, OtherThreadsMayCaptureMeanwhile) {
   cudaStreamDestroy(stream);
 }
 
+/// Work there would end what others capture on streams that wait for the default stream.
+TEST_F(CudaEmulation, TheDefaultStreamIsNotUsedWhileOthersCapture) {
+  std::vector<std::uint8_t> memory(24 * 24, 100);
+  CudaMatcher matcher(rig_, options_);
+  const CudaImage image{memory.data(), 24, PixelType::grey8};
+  const CudaImage images[] = {image, image};
+  const CudaViewMaps maps[2] = {};
+  matcher.enqueue(images, maps, nullptr);
+  cudaDeviceSynchronize();
+  cudaStream_t stream = nullptr;
+  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+  std::thread([&] {
+    EXPECT_THAT(error_of([&] { matcher.enqueue(images, maps, nullptr); }),
+                HasSubstr("use a stream of your own"));
+    EXPECT_THAT(error_of([&] { matcher.enqueue_next(images, maps, nullptr); }),
+                HasSubstr("use a stream of your own"));
+  }).join();
+  cudaGraph_t graph = nullptr;
+  EXPECT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+  cudaGraphDestroy(graph);
+  cudaStreamDestroy(stream);
+}
+
+TEST_F(CudaEmulation, AMotionThatIsNotAlignedIsRefused) {
+  std::vector<std::uint8_t> memory(24 * 24, 100);
+  CudaMatcher matcher(rig_, options_);
+  const CudaImage image{memory.data(), 24, PixelType::grey8};
+  const CudaImage images[] = {image, image};
+  const CudaViewMaps maps[2] = {};
+  matcher.enqueue(images, maps, nullptr);
+  double motion[13] = {};
+  const auto* shifted =
+      reinterpret_cast<const double*>(reinterpret_cast<const char*>(motion) + sizeof(float));
+  EXPECT_THAT(error_of([&] {
+                matcher.enqueue_next(images, maps, nullptr, {.device_now_from_previous = shifted});
+              }),
+              HasSubstr("no multiple of 8 bytes"));
+  cudaDeviceSynchronize();
+}
+
 /// Nothing that a thread writes may be read by another one of the launch: compute-sanitizer looks
 /// for races in shared memory alone.
 TEST_F(CudaEmulation, TheOrderOfThreadsDoesNotMatter) {
@@ -287,6 +328,11 @@ TEST_F(CudaEmulation, UnusableDevicesSayWhy) {
   emulation().major = 9;
   emulation().compute_mode = cudaComputeModeProhibited;
   EXPECT_THAT(error_of([] { Device::open("cuda:0"); }), HasSubstr("nvidia-smi -c 0"));
+  // As of architectures that CMake's words leave open, or of a driver older than the PTX.
+  emulation().compute_mode = cudaComputeModeDefault;
+  emulation().has_kernels = false;
+  EXPECT_THAT(error_of([] { Device::open("cuda"); }), HasSubstr("no kernels for its architecture"));
+  EXPECT_THAT(Device::open("auto").note(), HasSubstr("no kernels for its architecture"));
 }
 
 TEST_F(CudaEmulation, MissingDevicesSayWhyAndAutoOnlyWithADriver) {
