@@ -20,7 +20,7 @@ struct DevicePeaks {
 struct DeviceInfo {
   DeviceKind kind = DeviceKind::cpu;
   std::string id;        ///< what Device::open takes: "cpu", "vulkan:0", "cuda:0"
-  std::string name;      ///< as the driver says; what has the same one gives the same results
+  std::string name;      ///< as the driver says
   std::string type;      ///< "cpu", "discrete gpu", "integrated gpu", "virtual gpu", "other"
   std::string driver;    ///< name and version, where known; of the CPU, its threads
   std::string uuid;      ///< 32 hexadecimal digits, empty for the CPU
@@ -34,7 +34,8 @@ struct DeviceRequest {
   /// "vulkan", and either of the two with ":INDEX", ":NAME PART" or ":UUID"; a number is an index.
   std::string device = "auto";
   bool validation = false;  ///< Vulkan: validation layers with synchronization validation
-  /// Vulkan: file that keeps compiled pipelines between runs, empty for none.
+  /// Vulkan: file that keeps compiled pipelines between runs, empty for none. Matchers write it,
+  /// and throw Error where they cannot.
   std::string pipeline_cache = {};
   /// GPUs: longest dispatch in patch samples, so that slow devices answer within watchdog limits;
   /// 0 chooses by device. The result does not depend on it.

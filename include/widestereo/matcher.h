@@ -87,7 +87,8 @@ struct KernelWork {
 struct KernelTime {
   std::string kernel;
   int dispatches = 0;
-  double milliseconds = 0;  ///< device time, summed; 0 where kernels are not timed
+  double milliseconds = 0;  ///< device time, summed; 0 where kernels are not timed, or the
+                            ///< device has no clock
   KernelWork work = {};     ///< summed
 };
 
@@ -95,7 +96,7 @@ struct StereoResult {
   std::vector<ViewResult> views;   ///< one for each view of the rig
   std::vector<KernelTime> times;   ///< per kernel, in order of first use
   double milliseconds = 0;         ///< wall time of match(), uploads and downloads included
-  double device_milliseconds = 0;  ///< of the kernels together
+  double device_milliseconds = 0;  ///< of the kernels together; 0 where the device has no clock
   long long samples = 0;         ///< patch samples of the schedule at full windows (an upper bound)
   std::size_t device_bytes = 0;  ///< memory taken on the device
   Filter filter = Filter::exact;  ///< that was used: Options::filter where the device has it
@@ -154,7 +155,7 @@ class Matcher {
   /// GPU then finishes each before the next. Without, CUDA devices let those of different views
   /// overlap where there is no progress function, as a CudaMatcher does, and Vulkan devices start
   /// each as soon as barriers allow, as in a VulkanMatcher's commands. The CPU back end times
-  /// them in any case.
+  /// them in any case, CUDA devices do where there is a progress function.
   void time_kernels(bool each);
 
  private:

@@ -71,7 +71,8 @@ struct VulkanMap {
   VkDeviceSize pitch = 0;   ///< bytes from row to row, likewise
 };
 
-/// Results for one reference view; the same values as in ViewResult, 4 bytes each.
+/// Results for one reference view; the same values as in ViewResult, distances and normals to
+/// rounding, as a ViewResult's are computed on the host; 4 bytes each.
 struct VulkanViewMaps {
   VulkanMap distance;    ///< float: metres along the unit ray, 0 = no plane; not filtered
   VulkanMap normals;     ///< three floats x y z next to each other, 12 bytes a pixel
@@ -102,7 +103,7 @@ class VulkanMatcher {
  public:
   /// Allocates all memory, compiles the kernels, submits to the queue and waits for it.
   /// `pipeline_cache`: a file that keeps compiled kernels between runs; empty for none. Throws
-  /// Error when the rig, the options or the device do not do.
+  /// Error when the rig, the options or the device do not do, or that file cannot be written.
   VulkanMatcher(const VulkanHandles& handles, const Rig& rig, const Options& options,
                 const std::string& pipeline_cache = {});
   /// What was recorded must have finished.
@@ -117,7 +118,8 @@ class VulkanMatcher {
                       std::span<const VulkanViewMaps> maps) const;
 
   /// Records one match, outside a render pass, into a command buffer for a queue of the handles'
-  /// family: reads the images and writes the maps. Neither submits, waits nor allocates device
+  /// family, which must own the images and maps while the commands run (or share them): reads the
+  /// images and writes the maps. Neither submits, waits nor allocates device
   /// memory. The commands wait for earlier compute and transfer commands of the queue; images that
   /// other stages write, and the layouts of textures, need a barrier before them (to
   /// VK_ACCESS_SHADER_READ_BIT of the compute stage), and where other stages still read the maps,

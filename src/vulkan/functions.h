@@ -64,6 +64,7 @@ namespace widestereo {
   X(vkDestroyCommandPool)                         \
   X(vkAllocateCommandBuffers)                     \
   X(vkBeginCommandBuffer)                         \
+  X(vkResetCommandBuffer)                         \
   X(vkEndCommandBuffer)                           \
   X(vkCreateFence)                                \
   X(vkDestroyFence)                               \

@@ -65,8 +65,9 @@ std::vector<char> read_cache(const std::filesystem::path& path,
   const std::optional<FileHeader> header = header_of(path);
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  const bool is_whole =
-      header && !error && size >= sizeof *header && size - sizeof *header == header->bytes;
+  constexpr std::uint64_t most_bytes = 1 << 30;
+  const bool is_whole = header && !error && header->bytes <= most_bytes && size >= sizeof *header &&
+                        size - sizeof *header == header->bytes;
   if (!is_whole) return {};
   std::vector<char> data(header->bytes);
   std::ifstream file(path, std::ios::binary);

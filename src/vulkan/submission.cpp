@@ -2,6 +2,7 @@
 #include "vulkan/submission.h"
 
 #include <limits>
+#include <utility>
 
 namespace widestereo {
 namespace {
@@ -55,10 +56,14 @@ Submission::~Submission() { finish(); }
 VkCommandBuffer Submission::begin() {
   wait();
   const DeviceFunctions& vk = context_.vk();
+  if (std::exchange(recording_, false)) {
+    context_.check(vk.vkResetCommandBuffer(commands_, 0), "drop commands");
+  }
   VkCommandBufferBeginInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
   info.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
   context_.check(vk.vkBeginCommandBuffer(commands_, &info), "record commands");
+  recording_ = true;
   timestamps_ = 0;
   if (queries_.get() != VK_NULL_HANDLE) {
     vk.vkCmdResetQueryPool(commands_, queries_.get(), 0, max_timestamps_);
@@ -74,6 +79,7 @@ void Submission::write_timestamp() {
 
 void Submission::submit() {
   const DeviceFunctions& vk = context_.vk();
+  recording_ = false;
   context_.check(vk.vkEndCommandBuffer(commands_), "record commands");
   const VkFence fence = fence_.get();
   context_.check(vk.vkResetFences(context_.device(), 1, &fence), "reset a fence");

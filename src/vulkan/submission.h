@@ -19,7 +19,8 @@ class Submission {
   Submission(const Submission&) = delete;
   Submission& operator=(const Submission&) = delete;
 
-  /// Starts recording; waits for the end of what is still in flight.
+  /// Starts recording; waits for the end of what is still in flight. What was recorded and, as
+  /// something failed, not submitted is dropped.
   VkCommandBuffer begin();
   /// Notes the time when all earlier commands have finished. Does nothing on devices without a
   /// clock.
@@ -42,6 +43,7 @@ class Submission {
   Handle<VkQueryPool> queries_;
   std::uint32_t max_timestamps_ = 0;
   std::uint32_t timestamps_ = 0;
+  bool recording_ = false;
   bool in_flight_ = false;
 };
 

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -80,9 +81,11 @@ TEST(VulkanDevices, MissingIndexIsAnError) {
   EXPECT_THAT(error_of([] { open_vulkan_device(-1, {}); }), HasSubstr("no Vulkan device -1"));
 }
 
-TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
-  REQUIRE_VULKAN_OR_SKIP();
-  const auto device = open_vulkan_device(0, validated());
+/// `type`: what the device says it is, on which the kind of its kernels depends.
+void run_every_kernel_on(VkPhysicalDeviceType type) {
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults().type = type;
+  const auto device = open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr());
   std::set<std::string> have_run;
   for (const char* preset : {"paper", "fast"}) {
     SCOPED_TRACE(preset);
@@ -104,6 +107,17 @@ TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
         << to_string(kernel);
   }
   EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
+constexpr VkPhysicalDeviceType type_of_gpu = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+constexpr VkPhysicalDeviceType type_of_software = VK_PHYSICAL_DEVICE_TYPE_CPU;
+
+TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
+  REQUIRE_VULKAN_OR_SKIP();
+  for (const VkPhysicalDeviceType type : {type_of_gpu, type_of_software}) {
+    SCOPED_TRACE(type);
+    run_every_kernel_on(type);
+  }
 }
 
 TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
@@ -351,7 +365,7 @@ TEST(VulkanMatch, LeavesNoObjectBehind) {
 TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
-  const auto device = open_vulkan_device(0, {});
+  const auto device = open_vulkan_device(0, validated());
   const auto backend =
       device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
   EXPECT_THAT(error_of([&] { backend->set_rays(1, match.view(0).rays); }), HasSubstr("38x38"));
@@ -363,6 +377,9 @@ TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   Schedule raster = match.schedule();
   raster.dispatches.back().kernel = Kernel::iterate_raster;
   EXPECT_THAT(error_of([&] { backend->run(raster, {}); }), HasSubstr("sequential"));
+  // Refused while commands were recorded, which the next run drops.
+  backend->run(match.schedule(), {});
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
 }
 
 constexpr int demo_size = 32;
@@ -383,8 +400,23 @@ StereoResult match_demo_with(const Faults& faults, Filter filter) {
   return result;
 }
 
-constexpr VkPhysicalDeviceType type_of_gpu = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-constexpr VkPhysicalDeviceType type_of_software = VK_PHYSICAL_DEVICE_TYPE_CPU;
+TEST(VulkanMatch, NeedsNoClock) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const StereoResult expected = match_demo_with({}, Filter::exact);
+  const auto without_clock =
+      queue_family(VK_QUEUE_COMPUTE_BIT | VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_TRANSFER_BIT, 0);
+  const StereoResult result = match_demo_with({.queue_families = {without_clock}}, Filter::exact);
+  for (std::size_t view = 0; view < 2; ++view) {
+    expect_same_bits(expected.views[view], result.views[view]);
+  }
+  EXPECT_GT(expected.device_milliseconds, 0);
+  EXPECT_EQ(result.device_milliseconds, 0);
+  ASSERT_EQ(result.times.size(), expected.times.size());
+  for (std::size_t i = 0; i < result.times.size(); ++i) {
+    EXPECT_EQ(result.times[i].milliseconds, 0);
+    EXPECT_EQ(result.times[i].dispatches, expected.times[i].dispatches);
+  }
+}
 
 TEST(VulkanMatch, SoftwareLoadsTheBitsThatGpusGather) {
   REQUIRE_VULKAN_OR_SKIP();
@@ -638,6 +670,15 @@ TEST_F(VulkanCache, DamagedFilesAreIgnoredAndReplaced) {
   const std::vector<std::string> damaged = {"",           intact.substr(0, 9),
                                             overflowing,  intact.substr(0, intact.size() - 1),
                                             intact + "x", flipped};
+  // As large as it says, and more than there is memory for: a sparse file.
+  constexpr std::uint64_t huge = std::uint64_t{1} << 40;
+  std::string header = intact.substr(0, 24);
+  std::memcpy(header.data() + 8, &huge, sizeof huge);
+  overwrite(header);
+  std::filesystem::resize_file(path_, huge + header.size());
+  EXPECT_FALSE(is_used());
+  EXPECT_TRUE(same_bits(expected, match_with_cache()));
+  EXPECT_TRUE(is_used());
   for (const std::string& content_before : damaged) {
     overwrite(content_before);
     EXPECT_FALSE(is_used());
