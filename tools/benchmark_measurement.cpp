@@ -103,7 +103,8 @@ Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::
   m.window_radius = options.window_radius;
   m.options = ws::to_json(options);
   m.filter = results.front().filter;
-  m.wall = wall[wall.size() / 2];
+  const std::size_t middle = wall.size() / 2;
+  m.wall = wall.size() % 2 == 1 ? wall[middle] : 0.5 * (wall[middle - 1] + wall[middle]);
   m.wall_min = wall.front();
   m.wall_max = wall.back();
   m.kernels = per_map(median_of(timed).times, maps);

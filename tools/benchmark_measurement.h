@@ -8,7 +8,8 @@
 #include "widestereo/matcher.h"
 #include "widestereo/synthesis.h"
 
-/// One configuration, everything per depth map; a pair gives two.
+/// One configuration, everything per depth map, of which a pair gives two, but the kernels'
+/// dispatches, which are those of a match.
 struct Measurement {
   widestereo::DeviceInfo device;
   std::string preset;

@@ -124,6 +124,17 @@ void print(const ws::RigRefinement& refined, const std::vector<ws::ViewMatches>&
   }
 }
 
+/// Whether the matches fit hardly better than before. What changed then is their noise.
+bool fits_hardly_better(const ws::RigRefinement& refined) {
+  constexpr double least_share = 0.15;  // of a pair's error
+  for (std::size_t i = 0; i < refined.before.size(); ++i) {
+    if (!refined.left_out[i].empty()) continue;
+    const double before = refined.before[i].median_pixels;
+    if (before - refined.after[i].median_pixels > least_share * before) return false;
+  }
+  return true;
+}
+
 /// --max-theta is of one run.
 ws::Rig with_limits_of(const ws::Rig& calibrated, ws::Rig rig) {
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
@@ -148,6 +159,7 @@ void refine(const RefineArguments& arguments) {
   for (const auto* more : {&arguments.images, &arguments.rig.masks}) {
     read.insert(read.end(), more->begin(), more->end());
   }
+  require_different_images({arguments.images.begin(), arguments.images.end()});
   require_other_file(arguments.output.file, read);
   ws::require_writable(arguments.output.file);
   arguments.output.require_form(rig);  // before the work of matching
@@ -155,6 +167,10 @@ void refine(const RefineArguments& arguments) {
       match_frames(rig, arguments.images, arguments.white_level);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);
   arguments.output.write(with_limits_of(calibrated.rig, refined.rig));
+  if (fits_hardly_better(refined)) {
+    say("The features fit hardly better than before, so that the changes are their noise; keep " +
+        arguments.rig.calibration + ", or give more frames.");
+  }
   if (arguments.as_json) {
     nlohmann::ordered_json json = {{"frames", arguments.images.size() / count}};
     json.update(to_json(refined, pairs));

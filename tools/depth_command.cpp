@@ -17,6 +17,7 @@
 #include "sharpness_settings.h"
 #include "size_settings.h"
 #include "white_level.h"
+#include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -57,6 +58,9 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
                     " were given; leave it out or give one.");
   }
   if (!model) {
+    // Of what is missing, or neither an image nor a calibration, these say so.
+    ws::read_image(files.front());
+    ws::read_calibration(arguments.rig.calibration);
     throw ws::Error(
         "One image is not enough, unless --calibration is a COLMAP model to choose "
         "others from; give two or more.");

@@ -53,6 +53,13 @@ Json to_json(const ws::View& view) {
           {"mask_hash", mask_hash(view.mask)}};
 }
 
+Json device_record(const ws::DeviceInfo& device) {
+  Json record = {{"back_end", device.id.substr(0, device.id.find(':'))}, {"name", device.name}};
+  // The CPU's says its threads, which do not matter.
+  if (device.kind != ws::DeviceKind::cpu) record["driver"] = device.driver;
+  return record;
+}
+
 Json file_record(const std::filesystem::path& file) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(file, error);

@@ -73,7 +73,8 @@ bool is_blank(const cv::Mat& image, const cv::Mat& mask) {
 void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     const ws::View& view = rig.views[i];
-    if (!is_blank(images[i], view.mask)) continue;
+    const bool masked = !view.mask.empty() && cv::countNonZero(view.mask) == 0;
+    if (masked || !is_blank(images[i], view.mask)) continue;
     say("The image of " + view.name + " is blank but for noise; check its camera and lens.");
   }
 }

@@ -11,6 +11,7 @@
 
 #include "matching_run.h"
 #include "progress_bar.h"
+#include "say.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -123,9 +124,10 @@ PosedImages PosedImageSettings::of_model() const {
 
 PosedImages PosedImageSettings::of_trajectory() const {
   if (!poses.given() && frames.count != 1) {
-    // Of a model that lacks a file or is damaged, reading says so.
+    // Of a model that is missing, lacks a file or is damaged, reading says so.
     const fs::path calibration = rig.calibration;
-    if (fs::is_directory(calibration) || calibration.extension() == ".json") {
+    if (!fs::exists(calibration) || fs::is_directory(calibration) ||
+        calibration.extension() == ".json") {
       ws::read_calibration(calibration);
     }
     throw ws::Error(rig.calibration +
@@ -179,6 +181,9 @@ std::vector<bool> PosedImageSettings::apply_masks(PosedImages& posed) const {
     if (!fs::exists(mask)) continue;
     masked[i] = true;
     add_mask(view, ws::read_mask(mask), mask.string());
+    if (cv::countNonZero(view.mask) == 0) {
+      say(mask.string() + " leaves no pixel of " + view.name + ", of which nothing is matched.");
+    }
   }
   const bool found = std::find(masked.begin(), masked.end(), true) != masked.end();
   if (!found && !posed.calibrated.empty()) {

@@ -125,7 +125,7 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
           {"sources", std::max(sources_of(a), groups.front().size() - 1)},
           {"clouds", !a.format.no_cloud},
           {"pictures", !a.format.no_pictures},
-          {"device", device.name},
+          {"device", device_record(device)},
           {"options", options}};
 }
 

@@ -96,7 +96,7 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
       !std::all_of(before[kind_.results].begin(), before[kind_.results].end(),
                    [this](const Json& result) { return is_record_of_result(result); })) {
     throw ws::Error(path.string() + " is no record of a " + kind_.name +
-                    "; choose another folder.");
+                    "; remove it, or choose another folder.");
   }
   if (overwrite) {
     for (const Json& result : before[kind_.results]) {

@@ -54,7 +54,8 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
     if (view < 0 || view >= static_cast<int>(all.views.size())) {
       throw ws::Error(calibration + " has " + std::to_string(all.views.size()) +
                       " camera(s); there is no camera " + std::to_string(view) +
-                      ". Give one image for each camera, or choose cameras with --views.");
+                      ". Give one image for each camera, choose cameras with --views, or give the "
+                      "--poses of a camera that moved.");
     }
     rig.views.push_back(all.views[static_cast<std::size_t>(view)]);
   }

@@ -154,7 +154,7 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
                    {"png_scale", a.format.png_scale},
                    {"clouds", !a.format.no_cloud},
                    {"pictures", !a.format.no_pictures},
-                   {"device", device.name},
+                   {"device", device_record(device)},
                    {"options", Json::parse(ws::to_json(options))}};
   if (selection.motion.of == PoseSettings::imu) {
     settings["world_from_imu"] = to_json(*selection.rig.world_from_imu);

@@ -37,6 +37,7 @@ void run_synthesis(const SynthesisArguments& a) {
     read.insert(read.end(), a.rig.masks.begin(), a.rig.masks.end());
     require_other_file(a.picture, read);
   }
+  require_different_images({a.image, a.other});
   cv::Mat image = ws::to_grey_levels(a.white_level.read(a.image), a.image);
   cv::Mat other = ws::to_grey_levels(a.white_level.read(a.other), a.other);
   const ws::Rig rig =

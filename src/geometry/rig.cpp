@@ -44,7 +44,7 @@ void require_calibrated_size(const cv::Mat& map, const View& view, const std::st
   if (map.cols == camera.width && map.rows == camera.height) return;
   throw Error(name + " is " + size_text(map.cols, map.rows) + " pixels, but the calibration of " +
               view.name + " is for " + size_text(camera.width, camera.height) +
-              "; use images of the calibrated size.");
+              "; both must have the same size.");
 }
 
 }  // namespace widestereo

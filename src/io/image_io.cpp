@@ -270,6 +270,16 @@ cv::Mat read_mask(const std::filesystem::path& path) {
   // Before conversion to grey, which rounds the darkest colours to 0.
   std::vector<cv::Mat> channels;
   cv::split(image, channels);
+  if (channels.size() == 4) {
+    double least = 0;
+    double most = 0;
+    cv::minMaxLoc(channels[3], &least, &most);
+    if (least != most) {
+      throw Error(path.string() +
+                  " is transparent in places; save the mask without transparency, 0 where pixels "
+                  "are to be ignored.");
+    }
+  }
   cv::Mat mask = channels[0] != 0;
   for (std::size_t i = 1; i < std::min<std::size_t>(channels.size(), 3); ++i) {
     mask |= channels[i] != 0;

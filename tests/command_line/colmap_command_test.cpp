@@ -84,6 +84,10 @@ TEST_F(ColmapCommand, OneImageIsJoinedByTheBestOthers) {
   EXPECT_TRUE(same_bits(distance_in("one"), distance_in("colmap")));
   expect_error("depth " + file("left.png") + " -c " + file("same.yaml") + " -o " + file("out"),
                "One image is not enough");
+  expect_error("depth " + file("left.png") + " -c " + file("nowhere") + " -o " + file("out"),
+               file("nowhere"));
+  expect_error("depth " + file("l.png") + " -c " + file("same.yaml") + " -o " + file("out"),
+               file("l.png"));
   expect_error("depth " + file("away.png") + " -c " + file("model") + " -o " + file("out"),
                "no image that shares points");
 }
@@ -349,6 +353,11 @@ TEST_F(ReconstructCommand, MasksAreOfEachImage) {
   EXPECT_EQ(record()["images"][0]["group"][1]["masked_pixels"], 48 * 96);
   cv::imwrite(file("masks/right/1.png.png"), cv::Mat(mask, cv::Rect(0, 0, 9, 9)));
   expect_error(reconstruct() + "--overwrite --masks " + file("masks"), "1.png.png");
+  cv::imwrite(file("masks/right/1.png.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  const std::string of_nothing = run(reconstruct() + "--overwrite --masks " + file("masks")).output;
+  EXPECT_NE(of_nothing.find("1.png.png leaves no pixel of right/1.png"), std::string::npos)
+      << of_nothing;
+  EXPECT_EQ(of_nothing.find("is blank"), std::string::npos) << of_nothing;
 }
 
 TEST_F(ReconstructCommand, MasksOfImagesAddToThatOfAll) {

@@ -521,6 +521,12 @@ TEST_F(Command, RefusedRequestsLeaveNoFolder) {
                file("one.png") + " is 1x1 pixels");
   expect_error(depth + "--device cpu --mask " + file("none.png"),
                "The mask " + file("none.png") + " is 0 everywhere");
+  cv::Mat faded(96, 96, CV_8UC4, cv::Scalar::all(255));
+  cv::imwrite(file("opaque.png"), faded);
+  faded(cv::Rect(0, 0, 9, 9)) = cv::Scalar(255, 255, 255, 0);
+  cv::imwrite(file("faded.png"), faded);
+  expect_error(depth + "--device cpu --mask " + file("faded.png"),
+               file("faded.png") + " is transparent in places");
   expect_error("demo --size 64 --device cpu --levels 1 --level-iterations 1,2 -o " + file("out"),
                "level iterations");
   EXPECT_FALSE(fs::exists(folder_ / "out"));
@@ -854,7 +860,8 @@ TEST_F(Command, CalibrationIsRefined) {
                   "[0.0, 0.99939083, -0.03489950, 0.0]\n  - [0.0, 0.03489950, 0.99939083, 0.0]");
   folder_.write("turned.yaml", text);
   const std::string pair = file("left.png") + " " + file("right.png") + " ";
-  const std::string refine = "calibration refine " + pair + pair + "-c " + file("turned.yaml");
+  const std::string again = file(copy_of("left.png")) + " " + file(copy_of("right.png")) + " ";
+  const std::string refine = "calibration refine " + pair + again + "-c " + file("turned.yaml");
   Outcome outcome = run(refine + " --json -o " + file("refined.json") + " --to basalt");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const nlohmann::json json = nlohmann::json::parse(outcome.output);
@@ -893,9 +900,17 @@ TEST_F(Command, CalibrationIsRefined) {
                   outcome.output)["views"][1]["focal_length_percent"]["deviation"] > 0.0,
               intrinsics);
   }
+  const std::string hardly = "The features fit hardly better than before";
+  EXPECT_EQ(outcome.output.find(hardly), std::string::npos) << outcome.output;
+  outcome =
+      run("calibration refine " + pair + "-c " + file("calib.yaml") + " -o " + file("again.yaml"));
+  EXPECT_NE(outcome.output.find(hardly), std::string::npos) << outcome.output;
+  expect_error(
+      "calibration refine " + pair + pair + "-o " + file("no.yaml") + " -c " + file("calib.yaml"),
+      "left.png is given twice");
   // Of a second frame that shows nothing no features are added.
   cv::imwrite(file("flat.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(7)));
-  const std::string flat = file("flat.png") + " " + file("flat.png") + " ";
+  const std::string flat = file("flat.png") + " " + file(copy_of("flat.png")) + " ";
   outcome = run("calibration refine " + pair + flat + "-c " + file("turned.yaml") + " --json -o " +
                 file("again.yaml"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;

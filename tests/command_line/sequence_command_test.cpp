@@ -168,6 +168,15 @@ TEST_F(SequenceCommand, OtherSettingsNeedAnotherFolderOrOverwriting) {
   EXPECT_EQ(record()["frames"].size(), 1u);
   ASSERT_EQ(run(sequence() + "--seed 5 --overwrite --count 2").exit_code, 0);
   EXPECT_EQ(record()["frames"].size(), 2u);
+  // One card has the same name for both.
+  nlohmann::json of_another = record();
+  of_another["settings"]["device"]["back_end"] = "vulkan";
+  folder_.write("out/sequence.json", of_another.dump());
+  const Outcome resumed = run(sequence() + "--seed 5");
+  EXPECT_EQ(resumed.exit_code, 1);
+  EXPECT_NE(resumed.output.find("device/back_end is \"vulkan\" there and \"cpu\" now"),
+            std::string::npos)
+      << resumed.output;
   EXPECT_EQ(record()["settings"]["options"]["seed"], 5);
   folder_.write("out/sequence.json", "{\"frames\": [{\"name\": \"../data\"}], \"settings\": {}}");
   EXPECT_EQ(run(sequence() + "--overwrite").exit_code, 1);
