@@ -1,15 +1,25 @@
 // SPDX-License-Identifier: MIT
 #include "calibration_output.h"
 
+#include <filesystem>
+
 #include "widestereo/calibration.h"
 #include "widestereo/files.h"
 
 namespace ws = widestereo;
 
+namespace {
+
+constexpr const char* kalibr = "kalibr";
+constexpr const char* basalt = "basalt";
+
+}  // namespace
+
 void CalibrationOutput::add_format_to(CLI::App& command) {
-  command.add_option("--to", format, "kalibr or basalt")
-      ->check(CLI::IsMember({"kalibr", "basalt"}))
-      ->capture_default_str();
+  command
+      .add_option("--to", format,
+                  "kalibr or basalt; by default basalt where the file ends in .json")
+      ->check(CLI::IsMember({kalibr, basalt}));
 }
 
 void CalibrationOutput::require_form(const ws::Rig& rig) const { (void)text(rig); }
@@ -17,5 +27,7 @@ void CalibrationOutput::require_form(const ws::Rig& rig) const { (void)text(rig)
 void CalibrationOutput::write(const ws::Rig& rig) const { ws::write_text(file, text(rig)); }
 
 std::string CalibrationOutput::text(const ws::Rig& rig) const {
-  return format == "kalibr" ? ws::kalibr_text(file, rig) : ws::basalt_text(file, rig);
+  const bool ends_in_json = std::filesystem::path(file).extension() == ".json";
+  const std::string used = !format.empty() ? format : ends_in_json ? basalt : kalibr;
+  return used == kalibr ? ws::kalibr_text(file, rig) : ws::basalt_text(file, rig);
 }

@@ -8,7 +8,7 @@
 #include "widestereo/rig.h"
 
 struct CalibrationOutput {
-  std::string file, format = "kalibr";
+  std::string file, format;
 
   /// Adds --to.
   void add_format_to(CLI::App& command);

@@ -684,8 +684,7 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   EXPECT_NEAR(imu["rotation_degrees"].get<double>(), 120, 1e-9);
   outcome = run("calibration show " + file("imucam.yaml"));
   EXPECT_NE(outcome.output.find("0.0500 -0.0400 -0.0700 m"), std::string::npos) << outcome.output;
-  outcome =
-      run("calibration convert " + file("calib.yaml") + " " + file("calib.json") + " --to basalt");
+  outcome = run("calibration convert " + file("calib.yaml") + " " + file("calib.json"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_EQ(run("calibration show " + file("calib.json")).exit_code, 0);
   expect_error("calibration show " + file("left.png"), "left.png");
