@@ -41,7 +41,9 @@ void FrameSettings::add_to(CLI::App& command) {
       ->check(positive_number())
       ->capture_default_str()
       ->group(group);
-  command.add_flag("--skip-incomplete", skip_incomplete, "Leave out frames that a camera lacks")
+  command
+      .add_flag("--skip-incomplete", skip_incomplete,
+                "Leave out frames that a camera, or --poses, lacks")
       ->group(group);
 }
 

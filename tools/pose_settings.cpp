@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "pose_settings.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <numeric>
 #include <utility>
@@ -11,6 +12,20 @@
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
+
+namespace {
+
+void report_without_poses(const std::vector<ws::SequenceFrame>& all,
+                          const std::vector<std::size_t>& chosen,
+                          const std::vector<std::size_t>& found, const std::string& file) {
+  if (found.size() == chosen.size()) return;
+  const auto first = std::mismatch(found.begin(), found.end(), chosen.begin()).second;
+  say(std::to_string(chosen.size() - found.size()) + " of " + std::to_string(chosen.size()) +
+      " frames are left out, as " + file + " has no pose of their time; the first is " +
+      all[*first].name + ".");
+}
+
+}  // namespace
 
 void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const std::string& group) {
   command
@@ -38,10 +53,10 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
 
 RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
                             const std::vector<ws::SequenceFrame>& frames,
-                            const std::vector<std::size_t>& chosen) const {
+                            const std::vector<std::size_t>& chosen, bool skip_frames) const {
   ws::Trajectory trajectory = ws::read_trajectory(file);
   const std::string by_layout = trajectory.body == ws::Body::imu ? imu : camera;
-  RigPoses read{.poses = {}, .of = of.empty() ? by_layout : of};
+  RigPoses read{.poses = {}, .of = of.empty() ? by_layout : of, .frames = chosen};
   if (read.of == imu) {
     if (!rig.world_from_imu) {
       throw ws::Error(file + " holds poses of the IMU, but " + calibration +
@@ -56,7 +71,13 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
           calibration.c_str()));
     }
   }
-  read.poses = ws::poses_of_frames(frames, chosen, std::move(trajectory.poses), tolerance, file);
+  if (skip_frames) {
+    const auto found = ws::frames_with_poses(frames, chosen, trajectory.poses, tolerance);
+    if (!found.empty()) read.frames = found;  // else poses_of_frames() says what is wrong
+    report_without_poses(frames, chosen, read.frames, file);
+  }
+  read.poses =
+      ws::poses_of_frames(frames, read.frames, std::move(trajectory.poses), tolerance, file);
   return read;
 }
 
@@ -103,7 +124,7 @@ ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
   std::vector<std::size_t> all(frames.size());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<Eigen::Isometry3d> poses =
-      pose_settings.read(rig, settings.calibration, frames, all).poses;
+      pose_settings.read(rig, settings.calibration, frames, all, false).poses;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     ws::View& view = rig.views[i];
     // Cameras may have taken their images at the same time, under the same name.

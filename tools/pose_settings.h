@@ -14,7 +14,8 @@
 /// Poses of the rig, to world.
 struct RigPoses {
   std::vector<Eigen::Isometry3d> poses;
-  std::string of;  ///< what the file holds, camera or imu; empty without poses
+  std::string of;                   ///< what the file holds, camera or imu; empty without poses
+  std::vector<std::size_t> frames;  ///< that these are of
 };
 
 struct PoseSettings {
@@ -29,9 +30,10 @@ struct PoseSettings {
   void add_to(CLI::App& command, const std::string& purpose, const std::string& group);
   bool given() const { return !file.empty(); }
   /// The poses at the `chosen` ones of all frames; `calibration` names the file of the rig.
+  /// `skip_frames`: those that have none are left out, and a line says so.
   RigPoses read(const widestereo::Rig& rig, const std::string& calibration,
                 const std::vector<widestereo::SequenceFrame>& frames,
-                const std::vector<std::size_t>& chosen) const;
+                const std::vector<std::size_t>& chosen, bool skip_frames) const;
 };
 
 /// Moves the views of a model that lies far from its origin, as in a national grid, to where single

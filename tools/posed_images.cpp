@@ -145,14 +145,17 @@ PosedImages PosedImageSettings::of_trajectory() const {
   }
   const ChosenFrames chosen = frames.choose(images, cameras);
   const ws::Rig of_frame = rig.rig_for_images(cameras.size(), of_image);
-  const std::vector<Eigen::Isometry3d> world_from_rig =
-      poses.given() ? poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen).poses
-                    : std::vector{Eigen::Isometry3d::Identity()};
+  RigPoses known{.poses = {Eigen::Isometry3d::Identity()}, .of = {}, .frames = chosen.chosen};
+  if (poses.given()) {
+    known =
+        poses.read(of_frame, rig.calibration, chosen.all, chosen.chosen, frames.skip_incomplete);
+  }
+  const std::vector<Eigen::Isometry3d>& world_from_rig = known.poses;
   PosedImages posed;
-  posed.are_of_one_frame = chosen.chosen.size() == 1;
+  posed.are_of_one_frame = known.frames.size() == 1;
   posed.origin = world_from_rig.front().translation();
-  for (std::size_t k = 0; k < chosen.chosen.size(); ++k) {
-    const ws::SequenceFrame& frame = chosen.all[chosen.chosen[k]];
+  for (std::size_t k = 0; k < known.frames.size(); ++k) {
+    const ws::SequenceFrame& frame = chosen.all[known.frames[k]];
     for (std::size_t i = 0; i < of_frame.views.size(); ++i) {
       ws::View view = of_frame.views[i];
       view.name = frame.name + "/" + view.name;

@@ -127,7 +127,10 @@ Selection select_frames(const SequenceArguments& a) {
   a.rig.leave_out_dark_rims(selection.rig, first);
   selection.blurs = a.sharpness.blurs(selection.rig, first);
   if (a.poses.given()) {
-    selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen);
+    selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen,
+                                    a.frames.skip_incomplete);
+    selection.frames.clear();
+    for (const std::size_t i : selection.motion.frames) selection.frames.push_back(frames.all[i]);
   }
   return selection;
 }

@@ -70,6 +70,12 @@ std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
                                          const Eigen::Isometry3d& camera_from_imu,
                                          double imu_time_offset);
 
+/// Those of the chosen ones among all frames (by index) for which poses_of_frames() finds a pose
+/// near enough in time; all of them where frames have no times.
+std::vector<std::size_t> frames_with_poses(const std::vector<SequenceFrame>& frames,
+                                           const std::vector<std::size_t>& chosen,
+                                           std::vector<StampedPose> trajectory, double tolerance);
+
 /// The poses of the chosen ones among all frames (by index): the one nearest in time, within
 /// `tolerance` seconds, where frames have times, and no two poses of one time may differ then; else
 /// in their order, where there are as many and their times do not go back. Throws Error otherwise;

@@ -135,6 +135,34 @@ void require_one_pose_a_time(const std::vector<StampedPose>& sorted, const std::
               "; leave one.");
 }
 
+bool is_earlier(const StampedPose& a, const StampedPose& b) { return a.seconds < b.seconds; }
+
+double apart(const StampedPose& pose, double seconds) { return std::abs(pose.seconds - seconds); }
+
+double seconds_of(const SequenceFrame& frame) {
+  return static_cast<double>(*frame.nanoseconds) * 1e-9;
+}
+
+/// Of poses in the order of their times, at least one.
+const StampedPose& nearest_in_time(const std::vector<StampedPose>& trajectory, double seconds) {
+  auto nearest =
+      std::lower_bound(trajectory.begin(), trajectory.end(), seconds,
+                       [](const StampedPose& pose, double time) { return pose.seconds < time; });
+  if (nearest == trajectory.end() || (nearest != trajectory.begin() &&
+                                      apart(*(nearest - 1), seconds) < apart(*nearest, seconds))) {
+    --nearest;
+  }
+  return *nearest;
+}
+
+/// Which frame has no time though others have one, empty if none has.
+std::string without_time(const std::vector<SequenceFrame>& frames) {
+  const auto has_time = [](const SequenceFrame& frame) { return frame.nanoseconds.has_value(); };
+  const auto first = std::find_if_not(frames.begin(), frames.end(), has_time);
+  if (first == frames.end() || std::none_of(frames.begin(), frames.end(), has_time)) return "";
+  return " (the first is " + first->name + ")";
+}
+
 }  // namespace
 
 Trajectory read_trajectory(const std::filesystem::path& path) {
@@ -180,13 +208,27 @@ std::vector<StampedPose> poses_of_camera(std::vector<StampedPose> poses_of_imu,
   return poses_of_imu;
 }
 
+std::vector<std::size_t> frames_with_poses(const std::vector<SequenceFrame>& frames,
+                                           const std::vector<std::size_t>& chosen,
+                                           std::vector<StampedPose> trajectory, double tolerance) {
+  const bool all_finite =
+      std::all_of(trajectory.begin(), trajectory.end(),
+                  [](const StampedPose& pose) { return std::isfinite(pose.seconds); });
+  if (!have_times(frames) || trajectory.empty() || !all_finite) return chosen;
+  std::stable_sort(trajectory.begin(), trajectory.end(), is_earlier);
+  std::vector<std::size_t> found;
+  for (const std::size_t i : chosen) {
+    require_number(i, frames.size(), "frame", "The sequence");
+    const double seconds = seconds_of(frames[i]);
+    if (apart(nearest_in_time(trajectory, seconds), seconds) <= tolerance) found.push_back(i);
+  }
+  return found;
+}
+
 std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>& frames,
                                                const std::vector<std::size_t>& chosen,
                                                std::vector<StampedPose> trajectory,
                                                double tolerance, const std::string& name) {
-  const auto is_earlier = [](const StampedPose& a, const StampedPose& b) {
-    return a.seconds < b.seconds;
-  };
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     if (std::isfinite(trajectory[i].seconds)) continue;
     throw Error(name + ": pose " + std::to_string(i + 1) + " has no finite time; give it one.");
@@ -195,8 +237,9 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
   if (!have_times(frames)) {
     if (trajectory.size() != frames.size()) {
       throw Error(name + " has " + std::to_string(trajectory.size()) + " poses for " +
-                  std::to_string(frames.size()) +
-                  " frames without time stamps; give one pose for each frame.");
+                  std::to_string(frames.size()) + " frames without time stamps" +
+                  without_time(frames) +
+                  "; give one pose for each frame, or name images by their times.");
     }
     // Whether frame k's is the k-th of the file or the k-th in time, nobody could tell.
     const auto late = std::is_sorted_until(trajectory.begin(), trajectory.end(), is_earlier);
@@ -217,24 +260,16 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
   for (const std::size_t i : chosen) {
     require_number(i, frames.size(), "frame", "The sequence");
     const SequenceFrame& frame = frames[i];
-    const double seconds = static_cast<double>(*frame.nanoseconds) * 1e-9;
-    const auto apart = [seconds](const StampedPose& pose) {
-      return std::abs(pose.seconds - seconds);
-    };
-    auto nearest =
-        std::lower_bound(trajectory.begin(), trajectory.end(), seconds,
-                         [](const StampedPose& pose, double time) { return pose.seconds < time; });
-    if (nearest == trajectory.end() ||
-        (nearest != trajectory.begin() && apart(*(nearest - 1)) < apart(*nearest))) {
-      --nearest;
-    }
-    if (!(apart(*nearest) <= tolerance)) {
+    const double seconds = seconds_of(frame);
+    const StampedPose& nearest = nearest_in_time(trajectory, seconds);
+    if (!(apart(nearest, seconds) <= tolerance)) {
       // Single precision has no digits of the subtraction's rounding.
       throw Error(name + " has no pose within " + text_of(tolerance) + " s of the frame " +
-                  frame.name + " (the nearest is " + text_of(static_cast<float>(apart(*nearest))) +
-                  " s away); check the clocks, choose frames or raise the tolerance.");
+                  frame.name + " (the nearest is " +
+                  text_of(static_cast<float>(apart(nearest, seconds))) +
+                  " s away); check the clocks, choose or skip frames, or raise the tolerance.");
     }
-    poses.push_back(nearest->world_from_body);
+    poses.push_back(nearest.world_from_body);
   }
   return poses;
 }

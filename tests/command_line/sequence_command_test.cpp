@@ -452,6 +452,16 @@ TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_EQ(frames[0]["name"], "001");
   EXPECT_EQ(frames[1]["motion"], "poses");
+  const Outcome skipped = run(sequence("skipped", "euroc") + "--poses " + file("poses.txt") +
+                              " --restart-below 0 --skip-incomplete");
+  ASSERT_EQ(skipped.exit_code, 0) << skipped.output;
+  EXPECT_NE(skipped.output.find("1 of 3 frames are left out, as " + file("poses.txt") +
+                                " has no pose of their time; the first is 000."),
+            std::string::npos)
+      << skipped.output;
+  EXPECT_FALSE(fs::exists(folder_ / "skipped/000"));
+  EXPECT_TRUE(bytes_of(folder_ / "skipped/002/distance0.tiff") ==
+              bytes_of(folder_ / "out/002/distance0.tiff"));
   // The data set's own calibration is the same.
   std::string own = sequence("own", "euroc") + options;
   own.replace(own.find(file("calib.yaml")), file("calib.yaml").size(), file("euroc"));

@@ -472,6 +472,16 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
                 poses_of_frames(frames, {0, 1}, trajectory, 0.01, "p");
               }),
               HasSubstr("frame late"));
+  EXPECT_EQ(frames_with_poses(frames, {0, 1}, trajectory, 0.01), std::vector<std::size_t>{0});
+  EXPECT_EQ(frames_with_poses(frames, {0, 1}, trajectory, 0.06), (std::vector<std::size_t>{0, 1}));
+  std::vector<SequenceFrame> one_untimed = frames;
+  one_untimed.push_back({.name = "stray", .images = {}, .nanoseconds = std::nullopt});
+  EXPECT_EQ(frames_with_poses(one_untimed, {1, 2}, trajectory, 0.01),
+            (std::vector<std::size_t>{1, 2}));
+  trajectory.push_back({.seconds = 11, .world_from_body = Eigen::Isometry3d::Identity()});
+  EXPECT_THAT(error_of([&] { poses_of_frames(one_untimed, {0}, trajectory, 0.01, "p"); }),
+              HasSubstr("4 poses for 3 frames without time stamps (the first is stray)"));
+  trajectory.pop_back();
   EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, {}, 0.01, "p"); }),
               HasSubstr("no poses in p"));
