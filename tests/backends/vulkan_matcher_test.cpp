@@ -508,6 +508,71 @@ TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
+TEST(VulkanApplications, MayGiveSeveralMatchesToOneCommandBuffer) {
+  REQUIRE_VULKAN_OR_SKIP();
+  Application application;
+  Device device = Device::open("vulkan:0");
+  const RenderedPair pair = render_demo(side);
+  const std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
+  const Options options = small_options("fast");
+  Matcher expected(device, pair.rig, options);
+  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
+  ApplicationBuffers memory(application.context, PixelType::grey8);
+  const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
+  Commands commands(application.context);
+  matcher.record(commands.get(), bindings);
+  matcher.record_next(commands.get(), bindings);
+  commands.end();
+  memory.set(images);
+  commands.run();
+  expected.match(images);
+  memory.expect_equal(expected.match_next(images, {}));
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
+// Kernels of another kind than those that software runs.
+TEST(VulkanApplications, OfGpusGetTheMatchersResultToo) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults().type = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+  const PFN_vkGetInstanceProcAddr loader = FaultyLoader::get_instance_proc_addr();
+  Application application;
+  VulkanHandles handles = application.context.handles();
+  handles.get_instance_proc_addr = loader;
+  // Validated, as the application is: the faulty loader knows one kind of functions at a time.
+  Device device(open_vulkan_device(0, {.validation = true}, loader));
+  const RenderedPair pair = render_demo(side);
+  const Options options = small_options("fast");
+  Matcher expected(device, pair.rig, options);
+  VulkanMatcher matcher(handles, pair.rig, options);
+
+  const std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
+  ApplicationBuffers memory(application.context, PixelType::grey8);
+  const VulkanBindings buffers = matcher.bind(memory.images(), memory.maps());
+  memory.set(images);
+  Commands of_buffers(application.context);
+  matcher.record(of_buffers.get(), buffers);
+  of_buffers.end();
+  of_buffers.run();
+  memory.expect_equal(expected.match(images));
+
+  const std::vector<cv::Mat> intensities = device_images_of(pair, PixelType::intensity);
+  const Texture left(application.context, VK_FORMAT_R32_SFLOAT, {side, side});
+  const Texture right(application.context, VK_FORMAT_R32_SFLOAT, {side, side});
+  const VulkanTexture textures[] = {{.view = left.view()}, {.view = right.view()}};
+  const VulkanBindings of_textures = matcher.bind(textures, memory.maps());
+  Commands warm(application.context);
+  left.record_fill(warm.get(), intensities[0]);
+  right.record_fill(warm.get(), intensities[1]);
+  matcher.record_next(warm.get(), of_textures);
+  warm.end();
+  memory.clear();
+  warm.run();
+  memory.expect_equal(expected.match_next(intensities, {}));
+  EXPECT_THAT(device.validation_messages(), IsEmpty());
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
 TEST(VulkanApplications, MayGiveOneMatchToSeveralCommandBuffers) {
   REQUIRE_VULKAN_OR_SKIP();
   Application application;
