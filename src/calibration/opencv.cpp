@@ -59,14 +59,22 @@ class Storage {
     if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
   }
 
-  /// Those of the top level.
-  std::vector<std::string> keys() const { return file_.root().keys(); }
+  /// Those of the top level and of the maps there.
+  std::vector<std::string> keys() const {
+    std::vector<std::string> keys = file_.root().keys();
+    for (const cv::FileNode& map : file_.root()) {
+      if (!map.isMap()) continue;
+      const std::vector<std::string> more = map.keys();
+      keys.insert(keys.end(), more.begin(), more.end());
+    }
+    return keys;
+  }
 
   /// The first of the keys that holds a numeric matrix (or a list, or a number), as double; empty
   /// if none does.
   cv::Mat matrix(Keys keys) const {
     for (const char* key : keys) {
-      const cv::FileNode node = file_[key];
+      const cv::FileNode node = node_of(key);
       cv::Mat value = numbers(node);
       if (node.isMap()) {
         require_small(node, key);
@@ -106,6 +114,19 @@ class Storage {
   }
 
  private:
+  /// At the top level, or in the one map there that has the key: of several it would be of one
+  /// camera among others.
+  cv::FileNode node_of(const char* key) const {
+    const cv::FileNode top = file_[key];
+    cv::FileNode found;
+    if (!top.empty()) return top;
+    for (const cv::FileNode& map : file_.root()) {
+      if (!map.isMap() || map[key].empty()) continue;
+      if (!found.empty()) return {};
+      found = map[key];
+    }
+    return found;
+  }
   static bool is_number(const cv::FileNode& node) { return node.isReal() || node.isInt(); }
 
   /// A number, or a list as OpenCV writes a cv::Size, cv::Vec or std::vector; empty otherwise.
@@ -316,7 +337,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
                      {"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
                       "camera_matrix_left", "K", "camera_matrix"},
                      {"D1", "distCoeffs1", "dist_coeffs_1", "distortion_coefficients_1", "D_left",
-                      "distortion_left", "D", "distortion_coefficients"},
+                      "distortion_left", "dist_coeffs_left", "D", "distortion_coefficients"},
                      first_xi},
                     size);
     const bool single = storage
@@ -335,7 +356,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         {"cam1",
          {"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
          {"D2", "distCoeffs2", "dist_coeffs_2", "distortion_coefficients_2", "D_right",
-          "distortion_right"},
+          "distortion_right", "dist_coeffs_right"},
          second_xi},
         size);
     if ((rig.views[0].camera.model == CameraModel::mei) !=

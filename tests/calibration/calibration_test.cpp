@@ -494,6 +494,37 @@ TEST_F(OmnidirSamples, OfOneCameraAreRead) {
   expect_camera(rig.views[0].camera, 1.3);
 }
 
+/// The text below its header, as a map of the top level.
+std::string within_map(const std::string& name, const std::string& text) {
+  const std::string header = "%YAML:1.0\n---\n";
+  std::string within = header + name + ":\n   ";
+  for (const char c : text.substr(text.find("---\n") + 4)) {
+    within += c;
+    if (c == '\n') within += "   ";
+  }
+  return within + "\n";
+}
+
+TEST(OpenCv, ReadsMatricesWithinOneMap) {
+  const TemporaryFolder folder;
+  const Rig expected = read_calibration(folder.write("top.yml", opencv_text)).rig;
+  const std::string within = within_map("camera_params", opencv_text);
+  const Rig rig = read_calibration(folder.write("within.yml", within)).rig;
+  ASSERT_EQ(rig.views.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(rig.views[i].camera, expected.views[i].camera);
+    EXPECT_TRUE(rig.views[i].world_from_camera.isApprox(expected.views[i].world_from_camera, 0));
+  }
+  // Nobody could tell which of two is meant.
+  const std::string twice = within + within_map("others", opencv_text).substr(14);
+  EXPECT_NE(error_of(folder.write("twice.yml", twice)).find("no image size"), std::string::npos);
+  const std::string with_size = replaced(twice, "---\n", "---\nimage_size: [ 1280, 960 ]\n");
+  EXPECT_NE(error_of(folder.write("matrices.yml", with_size)).find("camera matrix (K1"),
+            std::string::npos);
+  EXPECT_NE(error_of(folder.write("xi.yml", within + "   xi_l: 1.2\n")).find("correct xi_l"),
+            std::string::npos);
+}
+
 /// The camera would be taken for one of cv::fisheye.
 TEST_F(OmnidirSamples, NoXiIsOverlooked) {
   const auto error_with = [&](const std::string& line) {
