@@ -240,6 +240,14 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool all
   for (const Images& of_camera : images) {
     for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
   }
+  // First of all, as more images or fewer frames would not help.
+  if (std::none_of(counts.begin(), counts.end(), [&](const auto& frame) {
+        return frame.second == static_cast<int>(images.size());
+      })) {
+    throw Error("No frame has images of all cameras, beginning with those in " +
+                images.front().folder.string() +
+                "; images of one frame must have equal names or times.");
+  }
   const bool are_listed = std::any_of(images.begin(), images.end(),
                                       [](const Images& of_camera) { return of_camera.listed; });
   std::vector<SequenceFrame> frames;
@@ -259,11 +267,6 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool all
     }
     frame.name = first_image(frame).stem().string();
     frames.push_back(std::move(frame));
-  }
-  if (std::none_of(frames.begin(), frames.end(), is_complete)) {
-    throw Error("No frame has images of all cameras, beginning with those in " +
-                images.front().folder.string() +
-                "; images of one frame must have equal names or times.");
   }
   require_usable_names(frames);
   leave_out_strays(frames);
