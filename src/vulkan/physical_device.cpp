@@ -12,6 +12,9 @@
 namespace widestereo {
 namespace {
 
+// Storage images and texel buffers of a stage, with those of conversions.
+constexpr std::uint32_t images_of_loading = 6;
+
 std::vector<VkQueueFamilyProperties> queue_families(const InstanceFunctions& vk,
                                                     VkPhysicalDevice device) {
   std::uint32_t count = 0;
@@ -129,6 +132,11 @@ std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice devic
   return queue_families(vk, device).at(queue_family).timestampValidBits;
 }
 
+bool loads_texels(const VkPhysicalDeviceProperties& properties) {
+  return properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU &&
+         properties.limits.maxPerStageDescriptorStorageImages >= images_of_loading;
+}
+
 std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   const VkPhysicalDeviceProperties properties = properties_of(vk, device);
   const VkPhysicalDeviceLimits& limits = properties.limits;
@@ -137,8 +145,8 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
            ", but 1.1 is needed; update the driver.";
   }
   if (!compute_queue_family(vk, device)) return "it has no compute queue; use another device.";
-  const bool in_software = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
-  if (in_software &&
+  const bool loads = loads_texels(properties);
+  if (loads &&
       !has_format(vk, device, format_of_loaded_texels,
                   VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_TRANSFER_DST_BIT)) {
     return "it lacks storage images of four 32-bit floats; use another device.";
@@ -159,10 +167,8 @@ std::string why_unusable(const InstanceFunctions& vk, VkPhysicalDevice device) {
   if (limits.maxComputeWorkGroupInvocations < 128) {
     return too_low("maxComputeWorkGroupInvocations", 128, limits.maxComputeWorkGroupInvocations);
   }
-  // With those of conversions; software devices bind intensities and maps as texel buffers, which
-  // count as images.
-  const std::uint32_t buffers = in_software ? 3 : 8;
-  const std::uint32_t images = in_software ? 6 : 1;
+  const std::uint32_t buffers = loads ? 3 : 8;
+  const std::uint32_t images = loads ? images_of_loading : 1;
   if (limits.maxPerStageDescriptorStorageBuffers < buffers) {
     return too_low("maxPerStageDescriptorStorageBuffers", buffers,
                    limits.maxPerStageDescriptorStorageBuffers);

@@ -33,6 +33,11 @@ std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice devic
 
 bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name);
 
+/// Whether kernels load texels and read maps as texel buffers, as is faster on devices that are
+/// programs, rather than sample textures: where limits allow so many, for texel buffers count as
+/// images.
+bool loads_texels(const VkPhysicalDeviceProperties& properties);
+
 /// Whether images of intensities can be filtered.
 bool filters_intensities(const InstanceFunctions& vk, VkPhysicalDevice device);
 /// Whether it offers shaderStorageImageExtendedFormats.

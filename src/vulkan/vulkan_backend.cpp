@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "vulkan/formats.h"
+#include "vulkan/physical_device.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -27,10 +28,6 @@ long long default_max_samples(VkPhysicalDeviceType type) {
     default:
       return 20'000'000;
   }
-}
-
-bool runs_on_cpu(const VulkanContext& context) {
-  return context.properties().deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU;
 }
 
 /// As the block of shaders/bindings.glsl.
@@ -82,7 +79,8 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
-      pipelines_(make_pipelines(context, constants, tuning.sampled.value_or(!runs_on_cpu(context)),
+      pipelines_(make_pipelines(context, constants,
+                                tuning.sampled.value_or(!loads_texels(context.properties())),
                                 cache.get())),
       staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
       sampler_(make_sampler(context, pipelines_.filters())),

@@ -83,6 +83,9 @@ VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceP
   if (faults().storage_buffers > 0) {
     out->limits.maxPerStageDescriptorStorageBuffers = faults().storage_buffers;
   }
+  if (faults().storage_images > 0) {
+    out->limits.maxPerStageDescriptorStorageImages = faults().storage_images;
+  }
 }
 
 VKAPI_ATTR void VKAPI_CALL properties_since_1_1(VkPhysicalDevice, VkPhysicalDeviceProperties2*) {

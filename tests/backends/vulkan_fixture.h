@@ -111,6 +111,7 @@ struct Faults {
   std::uint32_t largest_push_constants = 0;
   std::uint32_t largest_buffer = 0;  ///< bytes
   std::uint32_t storage_buffers = 0;
+  std::uint32_t storage_images = 0;
   std::string missing_function = {};
   int growing_caches = 0;  ///< how often a pipeline cache grows while it is read
   int allocations = 0;
