@@ -105,8 +105,8 @@ TEST(Maps, HaveTheCalibratedSize) {
   for (const auto& [width, height] : {std::pair(48, 64), {63, 48}, {64, 49}}) {
     EXPECT_EQ(error(width, height),
               "map.tiff is " + std::to_string(width) + "x" + std::to_string(height) +
-                  " pixels, but the calibration of cam1 is for 64x48; use images of the "
-                  "calibrated size.");
+                  " pixels, but the calibration of cam1 is for 64x48; both must have the same "
+                  "size.");
   }
 }
 
