@@ -59,6 +59,11 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
     }
     rig.views.push_back(all.views[static_cast<std::size_t>(view)]);
   }
+  if (views.empty() && image_count < all.views.size()) {
+    say("The images are taken to be of the first " + std::to_string(image_count) + " of the " +
+        std::to_string(all.views.size()) + " cameras in " + calibration +
+        "; --views chooses others.");
+  }
   limit_fields_of_view(rig);
   return rig;
 }

@@ -424,6 +424,11 @@ TEST_F(Command, BlankImagesAreNamed) {
           file("three.yaml") + " -o " + file("out") + quick);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("The image of cam2 is blank"), std::string::npos) << outcome.output;
+  const std::string which = "The images are taken to be of the first 2 of the 3 cameras";
+  EXPECT_EQ(outcome.output.find(which), std::string::npos);
+  const std::string pair = depth_of("left.png", "right.png", "three.yaml");
+  EXPECT_NE(run(pair).output.find(which), std::string::npos);
+  EXPECT_EQ(run(pair + "--views 0,1").output.find(which), std::string::npos);
   EXPECT_EQ(outcome.output.find("cam1 is blank"), std::string::npos) << outcome.output;
   EXPECT_EQ(run(depth_of("left.png", "right.png")).output.find("blank"), std::string::npos);
 }
