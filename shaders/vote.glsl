@@ -6,7 +6,7 @@
 // Displacement (source pixels) from which on a plane does not support another, and its inverse: Mesa multiplies with that
 // instead of dividing.
 #define VOTE_DISPLACEMENT 0.4f
-#define PER_VOTE_DISPLACEMENT 2.5f
+#define PER_VOTE_DISPLACEMENT (1.0f / VOTE_DISPLACEMENT)
 // Planes nearer than this to the pixel's own do not stand, so that curved surfaces stay curved.
 #define SAME_DISPLACEMENT 0.06f
 // Displacement up to which candidates are the same rival.

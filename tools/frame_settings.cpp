@@ -10,16 +10,11 @@
 namespace ws = widestereo;
 namespace fs = std::filesystem;
 
-namespace {
-
-void report_incomplete(const std::vector<ws::SequenceFrame>& all, std::size_t complete) {
-  if (complete == all.size()) return;
-  const auto first = std::find_if_not(all.begin(), all.end(), ws::is_complete);
-  say(std::to_string(all.size() - complete) + " of " + std::to_string(all.size()) +
-      " frames are left out, as a camera lacks them; the first is " + first->name + ".");
+void report_left_out(std::size_t left_out, std::size_t frames, const std::string& why,
+                     const std::string& first) {
+  say(std::to_string(left_out) + " of " + std::to_string(frames) + " frames are left out, " + why +
+      "; the first is " + first + ".");
 }
-
-}  // namespace
 
 void FrameSettings::add_to(CLI::App& command) {
   const std::string group = "Frames";
@@ -69,7 +64,11 @@ ChosenFrames FrameSettings::choose(const std::string& dataset,
   for (std::size_t i = 0; i < frames.all.size(); ++i) {
     if (ws::is_complete(frames.all[i])) complete.push_back(i);
   }
-  report_incomplete(frames.all, complete.size());
+  if (complete.size() < frames.all.size()) {
+    const auto lacking = std::find_if_not(frames.all.begin(), frames.all.end(), ws::is_complete);
+    report_left_out(frames.all.size() - complete.size(), frames.all.size(),
+                    "as a camera lacks them", lacking->name);
+  }
   if (first >= static_cast<int>(complete.size())) {
     throw ws::Error(dataset + " has " + std::to_string(complete.size()) +
                     " frames; there is no frame " + std::to_string(first) +

@@ -14,6 +14,10 @@ struct ChosenFrames {
   std::vector<std::size_t> chosen;  ///< of these, at least one, each with an image of every camera
 };
 
+/// Says how many of these frames are left out and `why` ("as ...").
+void report_left_out(std::size_t left_out, std::size_t frames, const std::string& why,
+                     const std::string& first);
+
 struct FrameSettings {
   /// What a data set is.
   static constexpr const char* layouts =

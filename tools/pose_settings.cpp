@@ -6,26 +6,13 @@
 #include <numeric>
 #include <utility>
 
+#include "frame_settings.h"
 #include "option_checks.h"
 #include "say.h"
 #include "text/formatted.h"
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
-
-namespace {
-
-void report_without_poses(const std::vector<ws::SequenceFrame>& all,
-                          const std::vector<std::size_t>& chosen,
-                          const std::vector<std::size_t>& found, const std::string& file) {
-  if (found.size() == chosen.size()) return;
-  const auto first = std::mismatch(found.begin(), found.end(), chosen.begin()).second;
-  say(std::to_string(chosen.size() - found.size()) + " of " + std::to_string(chosen.size()) +
-      " frames are left out, as " + file + " has no pose of their time; the first is " +
-      all[*first].name + ".");
-}
-
-}  // namespace
 
 void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const std::string& group) {
   command
@@ -73,8 +60,13 @@ RigPoses PoseSettings::read(const ws::Rig& rig, const std::string& calibration,
   }
   if (skip_frames) {
     const auto found = ws::frames_with_poses(frames, chosen, trajectory.poses, tolerance);
-    if (!found.empty()) read.frames = found;  // else poses_of_frames() says what is wrong
-    report_without_poses(frames, chosen, read.frames, file);
+    // Where there is none at all, poses_of_frames() says what is wrong.
+    if (!found.empty() && found.size() < chosen.size()) {
+      const auto first = std::mismatch(found.begin(), found.end(), chosen.begin()).second;
+      report_left_out(chosen.size() - found.size(), chosen.size(),
+                      "as " + file + " has no pose of their time", frames[*first].name);
+      read.frames = found;
+    }
   }
   read.poses =
       ws::poses_of_frames(frames, read.frames, std::move(trajectory.poses), tolerance, file);

@@ -119,8 +119,8 @@ class VulkanMatcher {
 
   /// Records one match, outside a render pass, into a command buffer for a queue of the handles'
   /// family, which must own the images and maps while the commands run (or share them): reads the
-  /// images and writes the maps. Neither submits, waits nor allocates device
-  /// memory. The commands wait for earlier compute and transfer commands of the queue; images that
+  /// images and writes the maps. Neither submits, waits nor allocates device memory. The commands
+  /// wait for earlier compute and transfer commands of the queue; images that
   /// other stages write, and the layouts of textures, need a barrier before them (to
   /// VK_ACCESS_SHADER_READ_BIT of the compute stage), and where other stages still read the maps,
   /// their next match needs one from these to the compute stage. Whoever reads the maps puts one

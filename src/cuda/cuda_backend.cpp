@@ -411,10 +411,10 @@ bool CudaBackend::captures(cudaStream_t stream) const {
   return status != cudaStreamCaptureStatusNone;
 }
 
-void CudaBackend::enqueue(std::size_t prepared, cudaStream_t stream) {
+void CudaBackend::enqueue(std::size_t prepared, cudaStream_t stream, bool captured) {
   const CurrentDevice current = make_current();
   const Prepared& match = prepared_.at(prepared);
-  if (!captures(stream)) {
+  if (!captured) {
     check(cudaGraphLaunch(match.graph.get(), stream), "launch a match");
     return;
   }

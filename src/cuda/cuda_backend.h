@@ -43,8 +43,8 @@ class CudaBackend final : public Backend {
   /// while another one captures: work enqueued there would end that capture.
   bool captures(cudaStream_t stream) const;
   /// Enqueues a prepared schedule; waits for nothing and allocates no device memory. Where the
-  /// stream captures, the kernels become nodes of what it captures.
-  void enqueue(std::size_t prepared, cudaStream_t stream);
+  /// stream captures, as captures() says, the kernels become nodes of what it captures.
+  void enqueue(std::size_t prepared, cudaStream_t stream, bool captured);
   /// Its parameters in device memory, for kernels that change them on the same stream.
   kernel::MatchParameters* parameters(std::size_t prepared) const;
   /// Device memory of a view, for kernels that fill and read the maps on the same stream.

@@ -69,8 +69,9 @@ class CudaMatcher::Implementation {
                cudaStream_t stream) {
     require_fitting(images, maps);
     const CurrentDevice current = make_current();
-    backend_.captures(stream);  // before anything is enqueued that would end another one's capture
-    enqueue_prepared(cold_, images, maps, stream);
+    // Before anything is enqueued that would end another one's capture.
+    const bool captured = backend_.captures(stream);
+    enqueue_prepared(cold_, images, maps, stream, captured);
     holds_planes_ = true;
   }
 
@@ -84,11 +85,11 @@ class CudaMatcher::Implementation {
     require_fitting(images, maps);
     require_aligned(start.device_now_from_previous);
     const CurrentDevice current = make_current();
-    backend_.captures(stream);
+    const bool captured = backend_.captures(stream);
     const CudaTarget& target = backend_.target();
     check(start_frame(frame_start(start), backend_.parameters(warm_), stream), target.name,
           "start a frame");
-    enqueue_prepared(warm_, images, maps, stream);
+    enqueue_prepared(warm_, images, maps, stream, captured);
   }
 
   std::size_t device_bytes() const { return backend_.device_bytes(); }
@@ -97,14 +98,14 @@ class CudaMatcher::Implementation {
   CurrentDevice make_current() const { return {backend_.target().ordinal, backend_.target().name}; }
 
   void enqueue_prepared(std::size_t prepared, std::span<const CudaImage> images,
-                        std::span<const CudaViewMaps> maps, cudaStream_t stream) {
+                        std::span<const CudaViewMaps> maps, cudaStream_t stream, bool captured) {
     const CudaTarget& target = backend_.target();
     for (std::size_t i = 0; i < images.size(); ++i) {
       const int view = static_cast<int>(i);
       check(import_image(images[i], backend_.memory(view), backend_.size(view).height, stream),
             target.name, "read an image");
     }
-    backend_.enqueue(prepared, stream);
+    backend_.enqueue(prepared, stream, captured);
     for (std::size_t i = 0; i < maps.size(); ++i) {
       const int view = static_cast<int>(i);
       check(export_maps(backend_.memory(view), maps[i], backend_.size(view).height, stream),

@@ -508,26 +508,31 @@ TEST(VulkanApplications, StartFromTheFrameBeforeAsTheMatcherDoes) {
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
-TEST(VulkanApplications, MayGiveSeveralMatchesToOneCommandBuffer) {
-  REQUIRE_VULKAN_OR_SKIP();
+/// The demo's scene in an application's buffers, and what a Matcher makes of it.
+struct DemoInApplication {
   Application application;
   Device device = Device::open("vulkan:0");
-  const RenderedPair pair = render_demo(side);
-  const std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
-  const Options options = small_options("fast");
-  Matcher expected(device, pair.rig, options);
-  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
-  ApplicationBuffers memory(application.context, PixelType::grey8);
-  const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
-  Commands commands(application.context);
-  matcher.record(commands.get(), bindings);
-  matcher.record_next(commands.get(), bindings);
+  RenderedPair pair = render_demo(side);
+  std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
+  Matcher expected = Matcher(device, pair.rig, small_options("fast"));
+  VulkanMatcher matcher =
+      VulkanMatcher(application.context.handles(), pair.rig, small_options("fast"));
+  ApplicationBuffers memory = ApplicationBuffers(application.context, PixelType::grey8);
+  VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
+};
+
+TEST(VulkanApplications, MayGiveSeveralMatchesToOneCommandBuffer) {
+  REQUIRE_VULKAN_OR_SKIP();
+  DemoInApplication demo;
+  Commands commands(demo.application.context);
+  demo.matcher.record(commands.get(), demo.bindings);
+  demo.matcher.record_next(commands.get(), demo.bindings);
   commands.end();
-  memory.set(images);
+  demo.memory.set(demo.images);
   commands.run();
-  expected.match(images);
-  memory.expect_equal(expected.match_next(images, {}));
-  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+  demo.expected.match(demo.images);
+  demo.memory.expect_equal(demo.expected.match_next(demo.images, {}));
+  EXPECT_THAT(demo.application.instance.validation_messages(), IsEmpty());
 }
 
 // Kernels of another kind than those that software runs.
@@ -575,29 +580,26 @@ TEST(VulkanApplications, OfGpusGetTheMatchersResultToo) {
 
 TEST(VulkanApplications, MayGiveOneMatchToSeveralCommandBuffers) {
   REQUIRE_VULKAN_OR_SKIP();
-  Application application;
-  Device device = Device::open("vulkan:0");
-  const RenderedPair pair = render_demo(side);
-  const std::vector<cv::Mat> images = device_images_of(pair, PixelType::grey8);
-  const Options options = small_options("fast");
-  Matcher expected(device, pair.rig, options);
-  VulkanMatcher matcher(application.context.handles(), pair.rig, options);
-  ApplicationBuffers memory(application.context, PixelType::grey8);
-  const VulkanBindings bindings = matcher.bind(memory.images(), memory.maps());
-  memory.set(images);
+  DemoInApplication demo;
+  demo.memory.set(demo.images);
   for (const bool warm : {false, true}) {
     std::deque<Commands> parts;
     std::vector<VkCommandBuffer> handles;
-    for (int i = 0; i < 5; ++i) handles.push_back(parts.emplace_back(application.context).get());
-    warm ? matcher.record_next(handles, bindings) : matcher.record(handles, bindings);
+    for (int i = 0; i < 5; ++i) {
+      handles.push_back(parts.emplace_back(demo.application.context).get());
+    }
+    warm ? demo.matcher.record_next(handles, demo.bindings)
+         : demo.matcher.record(handles, demo.bindings);
     for (Commands& part : parts) part.end();
-    memory.clear();
+    demo.memory.clear();
     for (Commands& part : parts) part.run();
-    memory.expect_equal(warm ? expected.match_next(images, {}) : expected.match(images));
+    demo.memory.expect_equal(warm ? demo.expected.match_next(demo.images, {})
+                                  : demo.expected.match(demo.images));
   }
-  EXPECT_THAT(error_of([&] { matcher.record(std::span<const VkCommandBuffer>(), bindings); }),
-              HasSubstr("no command buffer"));
-  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+  EXPECT_THAT(
+      error_of([&] { demo.matcher.record(std::span<const VkCommandBuffer>(), demo.bindings); }),
+      HasSubstr("no command buffer"));
+  EXPECT_THAT(demo.application.instance.validation_messages(), IsEmpty());
 }
 
 TEST(VulkanApplications, WhatDoesNotFitIsOneSentence) {

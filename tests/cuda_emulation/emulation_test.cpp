@@ -46,15 +46,24 @@ class CudaEmulation : public ::testing::Test {
   }
 
   void match_in_application() {
-    std::vector<std::uint8_t> memory(24 * 24, 100);  // outlives what is enqueued
     CudaMatcher matcher(rig_, options_);
-    const CudaImage image{memory.data(), 24, PixelType::grey8};
-    const CudaImage images[] = {image, image};
-    const CudaViewMaps maps[2] = {};
-    matcher.enqueue(images, maps, nullptr);
-    matcher.enqueue(images, maps, nullptr);
-    matcher.enqueue_next(images, maps, nullptr);
+    matcher.enqueue(device_images_, maps_, nullptr);
+    matcher.enqueue(device_images_, maps_, nullptr);
+    matcher.enqueue_next(device_images_, maps_, nullptr);
     cudaDeviceSynchronize();
+  }
+  /// Acts in another thread while a stream captures that waits for the default stream, as most do;
+  /// the capture must not end by that.
+  template <class Action>
+  void while_a_stream_captures(Action action) {
+    cudaStream_t stream = nullptr;
+    ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+    ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+    std::thread(action).join();
+    cudaGraph_t graph = nullptr;
+    EXPECT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+    cudaGraphDestroy(graph);
+    cudaStreamDestroy(stream);
   }
 
   /// Every call in turn fails; each failure must be one sentence and leave nothing behind.
@@ -84,6 +93,10 @@ class CudaEmulation : public ::testing::Test {
   Rig rig_;
   Options options_;
   std::vector<cv::Mat> images_;
+  std::vector<std::uint8_t> memory_ = std::vector<std::uint8_t>(24 * 24, 100);
+  const std::array<CudaImage, 2> device_images_ = {CudaImage{memory_.data(), 24, PixelType::grey8},
+                                                   CudaImage{memory_.data(), 24, PixelType::grey8}};
+  const std::array<CudaViewMaps, 2> maps_ = {};
   long failures_ = 0;
 };
 
@@ -100,59 +113,36 @@ TEST_F(CudaEmulation, TheDeviceMayBeLostAtAnyCallOfAnApplication) {
 }
 
 TEST_F(CudaEmulation, OtherThreadsMayCaptureMeanwhile) {
-  cudaStream_t stream = nullptr;  // waits for the default stream, as most do
-  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
-  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-  std::string error;
-  std::thread([&] {
-    error = error_of([this] {
-      match();
-      const CudaMatcher matcher(rig_, options_);
-    });
-  }).join();
-  EXPECT_EQ(error, "");
-  cudaGraph_t graph = nullptr;
-  EXPECT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-  cudaGraphDestroy(graph);
-  cudaStreamDestroy(stream);
+  while_a_stream_captures([this] {
+    EXPECT_EQ(error_of([this] {
+                match();
+                const CudaMatcher matcher(rig_, options_);
+              }),
+              "");
+  });
 }
 
-/// Work there would end what others capture on streams that wait for the default stream.
 TEST_F(CudaEmulation, TheDefaultStreamIsNotUsedWhileOthersCapture) {
-  std::vector<std::uint8_t> memory(24 * 24, 100);
   CudaMatcher matcher(rig_, options_);
-  const CudaImage image{memory.data(), 24, PixelType::grey8};
-  const CudaImage images[] = {image, image};
-  const CudaViewMaps maps[2] = {};
-  matcher.enqueue(images, maps, nullptr);
+  matcher.enqueue(device_images_, maps_, nullptr);
   cudaDeviceSynchronize();
-  cudaStream_t stream = nullptr;
-  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
-  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
-  std::thread([&] {
-    EXPECT_THAT(error_of([&] { matcher.enqueue(images, maps, nullptr); }),
+  while_a_stream_captures([&] {
+    EXPECT_THAT(error_of([&] { matcher.enqueue(device_images_, maps_, nullptr); }),
                 HasSubstr("use a stream of your own"));
-    EXPECT_THAT(error_of([&] { matcher.enqueue_next(images, maps, nullptr); }),
+    EXPECT_THAT(error_of([&] { matcher.enqueue_next(device_images_, maps_, nullptr); }),
                 HasSubstr("use a stream of your own"));
-  }).join();
-  cudaGraph_t graph = nullptr;
-  EXPECT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
-  cudaGraphDestroy(graph);
-  cudaStreamDestroy(stream);
+  });
 }
 
 TEST_F(CudaEmulation, AMotionThatIsNotAlignedIsRefused) {
-  std::vector<std::uint8_t> memory(24 * 24, 100);
   CudaMatcher matcher(rig_, options_);
-  const CudaImage image{memory.data(), 24, PixelType::grey8};
-  const CudaImage images[] = {image, image};
-  const CudaViewMaps maps[2] = {};
-  matcher.enqueue(images, maps, nullptr);
+  matcher.enqueue(device_images_, maps_, nullptr);
   double motion[13] = {};
   const auto* shifted =
       reinterpret_cast<const double*>(reinterpret_cast<const char*>(motion) + sizeof(float));
   EXPECT_THAT(error_of([&] {
-                matcher.enqueue_next(images, maps, nullptr, {.device_now_from_previous = shifted});
+                matcher.enqueue_next(device_images_, maps_, nullptr,
+                                     {.device_now_from_previous = shifted});
               }),
               HasSubstr("no multiple of 8 bytes"));
   cudaDeviceSynchronize();
@@ -257,18 +247,14 @@ TEST_F(CudaEmulation, AnotherScheduleMakesAnotherGraph) {
 }
 
 TEST_F(CudaEmulation, FramesOfAnApplicationAllocateNothing) {
-  std::vector<std::uint8_t> memory(24 * 24, 100);
   CudaMatcher matcher(rig_, options_);
-  const CudaImage image{memory.data(), 24, PixelType::grey8};
-  const CudaImage images[] = {image, image};
-  const CudaViewMaps maps[2] = {};
-  matcher.enqueue(images, maps, nullptr);
+  matcher.enqueue(device_images_, maps_, nullptr);
   const int live = emulation().live_objects;
   const int kernels = emulation().kernels_run;
   for (int i = 0; i < 3; ++i) {
-    matcher.enqueue(images, maps, nullptr);
-    matcher.enqueue_next(images, maps, nullptr);
-    matcher.enqueue_next(images, maps, nullptr, {.frame = i});
+    matcher.enqueue(device_images_, maps_, nullptr);
+    matcher.enqueue_next(device_images_, maps_, nullptr);
+    matcher.enqueue_next(device_images_, maps_, nullptr, {.frame = i});
   }
   EXPECT_EQ(emulation().live_objects, live);
   EXPECT_EQ(emulation().kernels_run, kernels);  // nothing has waited
