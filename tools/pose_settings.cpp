@@ -31,7 +31,8 @@ void PoseSettings::add_to(CLI::App& command, const std::string& purpose, const s
       ->group(group);
   command
       .add_option("--poses-tolerance", tolerance,
-                  "Largest difference of time between image and pose, seconds")
+                  "Largest time between an image and the nearest pose, seconds; images between two "
+                  "poses get what lies between these")
       ->check(non_negative_number())
       ->needs("--poses")
       ->capture_default_str()

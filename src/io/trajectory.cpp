@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -18,6 +19,7 @@ namespace widestereo {
 namespace {
 
 constexpr std::size_t numbers_of_pose = 8;  // time, position, quaternion
+constexpr std::size_t first_of_quaternion = 4;
 constexpr const char* space = " \t\r";
 
 std::string trimmed(const std::string& text) {
@@ -44,25 +46,37 @@ bool is_comma_separated(const std::string& line) {
   return after != std::string::npos && line[after] == ',';
 }
 
-/// Whether a column's name ends in w, before its unit; columns count from 0.
-bool names_w(const std::vector<std::string>& names, std::size_t column) {
-  if (names.size() < numbers_of_pose) return false;
-  const std::string name = trimmed(names[column].substr(0, names[column].find('[')));
-  return !name.empty() && (name.back() == 'w' || name.back() == 'W');
+/// The last letters of the columns' names, before their units, in lower case.
+std::string last_letters(const std::vector<std::string>& names) {
+  std::string letters;
+  for (const std::string& name : names) {
+    const std::string word = trimmed(name.substr(0, name.find('[')));
+    letters += word.empty() ? ' ' : static_cast<char>(std::tolower(word.back()));
+  }
+  return letters;
 }
 
-/// Throws Error where the header names the quaternion's w in another place than it is looked for.
-void require_order_of(const std::string& header, bool comma_separated, const std::string& name) {
-  constexpr std::size_t first_of_quaternion = 4, last = numbers_of_pose - 1;
-  const std::size_t begin = header.find_first_not_of("# \t\r");
+/// Throws Error where a comment names the quaternion's w in another place than it is looked for.
+void require_order_of(const std::string& comment, bool w_first, const std::string& name) {
+  const std::size_t begin = comment.find_first_not_of("# \t\r");
   if (begin == std::string::npos) return;
-  const std::vector<std::string> names = words_of(header.substr(begin), comma_separated);
-  if (comma_separated && names_w(names, last)) {
+  const bool by_commas = comment.find(',') != std::string::npos;
+  const std::string letters = last_letters(words_of(comment.substr(begin), by_commas));
+  const auto names = [&letters](const char* quaternion) {
+    return letters.compare(std::min(first_of_quaternion, letters.size()), 4, quaternion) == 0;
+  };
+  if (w_first && names("xyzw")) {
     throw Error(name + " names the quaternion's w last; write qw,qx,qy,qz.");
   }
-  if (!comma_separated && names_w(names, first_of_quaternion)) {
+  if (!w_first && names("wxyz")) {
     throw Error(name + " names the quaternion's w first; write qx qy qz qw.");
   }
+}
+
+/// ORB-SLAM3's trajectories in EuRoC's form have nanoseconds between blanks.
+double seconds(double time) {
+  constexpr double earliest_nanosecond = 1e17;  // of 1973
+  return time < earliest_nanosecond ? time : time * 1e-9;
 }
 
 /// How all lines of a file hold poses, told by its first one.
@@ -90,7 +104,7 @@ class PoseLine {
                                             ? Eigen::Quaterniond(v[4], v[5], v[6], v[7])
                                             : Eigen::Quaterniond(v[7], v[4], v[5], v[6]);
     StampedPose pose;
-    pose.seconds = comma_separated_ ? seconds(words[0], where) : v[0];
+    pose.seconds = comma_separated_ ? seconds_of_nanoseconds(words[0], where) : seconds(v[0]);
     pose.world_from_body = Eigen::Translation3d(v[1], v[2], v[3]) *
                            require_unit(rotation, where, "a pose is " + form_);
     return pose;
@@ -103,7 +117,7 @@ class PoseLine {
     return *value;
   }
 
-  double seconds(const std::string& word, const std::string& where) const {
+  double seconds_of_nanoseconds(const std::string& word, const std::string& where) const {
     std::int64_t nanoseconds = 0;
     const char* end = word.data() + word.size();
     const auto result = std::from_chars(word.data(), end, nanoseconds);
@@ -143,16 +157,37 @@ double seconds_of(const SequenceFrame& frame) {
   return static_cast<double>(*frame.nanoseconds) * 1e-9;
 }
 
+/// The first pose at that time or later, of poses in the order of their times.
+std::vector<StampedPose>::const_iterator first_from(const std::vector<StampedPose>& trajectory,
+                                                    double seconds) {
+  return std::lower_bound(trajectory.begin(), trajectory.end(), seconds,
+                          [](const StampedPose& pose, double time) { return pose.seconds < time; });
+}
+
 /// Of poses in the order of their times, at least one.
 const StampedPose& nearest_in_time(const std::vector<StampedPose>& trajectory, double seconds) {
-  auto nearest =
-      std::lower_bound(trajectory.begin(), trajectory.end(), seconds,
-                       [](const StampedPose& pose, double time) { return pose.seconds < time; });
+  auto nearest = first_from(trajectory, seconds);
   if (nearest == trajectory.end() || (nearest != trajectory.begin() &&
                                       apart(*(nearest - 1), seconds) < apart(*nearest, seconds))) {
     --nearest;
   }
   return *nearest;
+}
+
+/// Where the body was at that time: between the poses before and after, as if it moved uniformly
+/// from one to the other; the first or last one's place beyond. Poses in the order of their times.
+Eigen::Isometry3d pose_at(const std::vector<StampedPose>& trajectory, double seconds) {
+  const auto after = first_from(trajectory, seconds);
+  if (after == trajectory.end()) return trajectory.back().world_from_body;
+  if (after == trajectory.begin() || after->seconds == seconds) return after->world_from_body;
+  const StampedPose& before = *(after - 1);
+  const double share = (seconds - before.seconds) / (after->seconds - before.seconds);
+  const Eigen::Isometry3d& from = before.world_from_body;
+  const Eigen::Isometry3d& to = after->world_from_body;
+  const Eigen::Quaterniond rotation =
+      Eigen::Quaterniond(from.linear()).slerp(share, Eigen::Quaterniond(to.linear()));
+  return Eigen::Translation3d((1 - share) * from.translation() + share * to.translation()) *
+         rotation.normalized();
 }
 
 /// Which frame has no time though others have one, empty if none has.
@@ -173,17 +208,20 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   TextInput file(path);
   Trajectory trajectory;
   std::optional<PoseLine> layout;
-  std::string header, line;
+  std::vector<std::string> comments;
+  std::string line;
   for (int number = 1; file.next_line(line); ++number) {
     const std::size_t first = line.find_first_not_of(space);
     if (first == std::string::npos) continue;
     if (line[first] == '#') {
-      header = line;
+      if (!layout) comments.push_back(line);
       continue;
     }
     if (!layout) {
       layout.emplace(line.substr(first));
-      if (!header.empty()) require_order_of(header, layout->comma_separated(), path.string());
+      for (const std::string& comment : comments) {
+        require_order_of(comment, layout->comma_separated(), path.string());
+      }
     }
     trajectory.poses.push_back(
         layout->pose(line, path.string() + " line " + std::to_string(number)));
@@ -269,7 +307,7 @@ std::vector<Eigen::Isometry3d> poses_of_frames(const std::vector<SequenceFrame>&
                   text_of(static_cast<float>(apart(nearest, seconds))) +
                   " s away); check the clocks, choose or skip frames, or raise the tolerance.");
     }
-    poses.push_back(nearest.world_from_body);
+    poses.push_back(pose_at(trajectory, seconds));
   }
   return poses;
 }
