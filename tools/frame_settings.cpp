@@ -37,6 +37,14 @@ void FrameSettings::add_to(CLI::App& command) {
       ->capture_default_str()
       ->group(group);
   command
+      .add_option(
+          "--time-tolerance", time_tolerance,
+          "Images that are this near in time are of one frame, seconds; otherwise times must "
+          "be equal")
+      ->check(non_negative_number())
+      ->capture_default_str()
+      ->group(group);
+  command
       .add_flag("--skip-incomplete", skip_incomplete,
                 "Leave out frames that a camera, or --poses, lacks")
       ->group(group);
@@ -57,9 +65,10 @@ ChosenFrames FrameSettings::choose(const std::string& dataset,
   }
   std::vector<fs::path> of_cameras;
   for (const std::string& folder : folders) of_cameras.push_back(fs::path(dataset) / folder);
-  ChosenFrames frames{.all = folders.empty() ? ws::read_sequence(dataset, cameras, skip_incomplete)
-                                             : ws::read_sequence(of_cameras, skip_incomplete),
-                      .chosen = {}};
+  ChosenFrames frames{
+      .all = folders.empty() ? ws::read_sequence(dataset, cameras, skip_incomplete, time_tolerance)
+                             : ws::read_sequence(of_cameras, skip_incomplete, time_tolerance),
+      .chosen = {}};
   std::vector<std::size_t> complete;
   for (std::size_t i = 0; i < frames.all.size(); ++i) {
     if (ws::is_complete(frames.all[i])) complete.push_back(i);

@@ -21,19 +21,22 @@ void report_left_out(std::size_t left_out, std::size_t frames, const std::string
 struct FrameSettings {
   /// What a data set is.
   static constexpr const char* layouts =
-      "Folder with cam0/, cam1/, ... (frames have equal file names), or in EuRoC or TUM VI layout "
+      "Folder with cam0/, cam1/, ... (frames have equal file names, or numbers in them), or in "
+      "EuRoC or TUM VI layout "
       "(mav0/camN/data, data.csv)";
 
   std::vector<std::string> folders;  ///< of the cameras' images in the data set; empty: cam0, ...
   int first = 0;
   int count = 0;  ///< 0 = all
   int step = 1;
+  double time_tolerance = 0;  ///< seconds
   bool skip_incomplete = false;
 
-  /// Adds --folders, --first, --count, --step and --skip-incomplete.
+  /// Adds --folders, --first, --count, --step, --time-tolerance and --skip-incomplete.
   void add_to(CLI::App& command);
   bool given() const {
-    return !folders.empty() || first > 0 || count > 0 || step > 1 || skip_incomplete;
+    return !folders.empty() || first > 0 || count > 0 || step > 1 || time_tolerance > 0 ||
+           skip_incomplete;
   }
   /// An image of the first of some cameras.
   std::filesystem::path example(const std::string& dataset, int first_camera) const;

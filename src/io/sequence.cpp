@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <functional>
 #include <map>
+#include <utility>
 
+#include "io/frame_images.h"
 #include "io/frame_times.h"
 #include "text/lower_case.h"
+#include "text/number.h"
 #include "text/text_input.h"
 #include "widestereo/error.h"
 
@@ -24,59 +26,8 @@ bool is_image(const fs::path& path) {
   return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-bool is_number(const std::string& text) {
-  return !text.empty() && std::all_of(text.begin(), text.end(), is_digit);
-}
-
-/// Numbers within names count as numbers, so that frame_2 is before frame_10.
-struct InOrder {
-  bool operator()(const std::string& a, const std::string& b) const {
-    std::string_view x = a;
-    std::string_view y = b;
-    while (!x.empty() && !y.empty()) {
-      const std::string_view part_of_x = first_part(x);
-      const std::string_view part_of_y = first_part(y);
-      const bool are_numbers = is_digit(x.front()) && is_digit(y.front());
-      const int order =
-          are_numbers ? compare_numbers(part_of_x, part_of_y) : part_of_x.compare(part_of_y);
-      if (order != 0) return order < 0;
-      x.remove_prefix(part_of_x.size());
-      y.remove_prefix(part_of_y.size());
-    }
-    if (x.empty() != y.empty()) return x.empty();
-    return a < b;  // 7 and 007 are two names
-  }
-
- private:
-  /// A whole number, or one character.
-  static std::string_view first_part(std::string_view text) {
-    if (!is_digit(text.front())) return text.substr(0, 1);
-    const auto end = std::find_if_not(text.begin(), text.end(), is_digit);
-    return text.substr(0, static_cast<std::size_t>(end - text.begin()));
-  }
-  /// Of any length.
-  static int compare_numbers(std::string_view a, std::string_view b) {
-    a = significant(a);
-    b = significant(b);
-    return a.size() != b.size() ? (a.size() < b.size() ? -1 : 1) : a.compare(b);
-  }
-  static std::string_view significant(std::string_view number) {
-    return number.substr(std::min(number.find_first_not_of('0'), number.size()));
-  }
-};
-
-/// Images of one camera by what frames are matched by: names, or nanoseconds where a list gives
-/// them.
-struct Images {
-  fs::path folder;
-  std::map<std::string, fs::path, InOrder> of_frames;
-  bool listed = false;
-};
-
-Images images_in(const fs::path& folder) {
-  Images images;
+CameraImages images_in(const fs::path& folder) {
+  CameraImages images;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; entry != end; entry.increment(error)) {
     std::error_code ignored;  // a link to nothing is no image
@@ -99,9 +50,9 @@ Images images_in(const fs::path& folder) {
   return images;
 }
 
-Images images_listed_in(const fs::path& list) {
+CameraImages images_listed_in(const fs::path& list) {
   TextInput file(list);
-  Images images;
+  CameraImages images;
   images.listed = true;
   std::map<std::string, int> lines;
   std::string line;
@@ -112,7 +63,7 @@ Images images_listed_in(const fs::path& list) {
     const std::string time = line.substr(0, comma);
     const std::size_t start =
         comma == std::string::npos ? comma : line.find_first_not_of(' ', comma + 1);
-    if (!is_number(time) || time.size() > 19 || start == std::string::npos) {
+    if (!whole_number(time) || start == std::string::npos) {
       throw Error(list.string() + " line " + std::to_string(number) +
                   " is no \"nanoseconds,filename\".");
     }
@@ -142,14 +93,14 @@ fs::file_type type_of(const fs::path& path) {
 bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::directory; }
 
 /// Leaves out what a list names and is not there.
-void leave_out_missing(Images& images) {
+void leave_out_missing(CameraImages& images) {
   std::erase_if(images.of_frames, [](const auto& image) {
     return type_of(image.second) == fs::file_type::not_found;
   });
 }
 
 /// Before any frame is matched, for that may be hours before the missing one's turn.
-void require_listed(const Images& images) {
+void require_listed(const CameraImages& images) {
   for (const auto& [time, path] : images.of_frames) {
     if (type_of(path) != fs::file_type::not_found) continue;
     throw Error("The frame " + time + " has no image " + path.string() +
@@ -158,18 +109,18 @@ void require_listed(const Images& images) {
 }
 
 /// Of one camera, listed or not.
-Images images_of(const fs::path& folder, bool skip_missing) {
+CameraImages images_of(const fs::path& folder, bool skip_missing) {
   const fs::path list = folder / "data.csv";
-  Images images = type_of(list) == fs::file_type::regular ? images_listed_in(list)
-                  : is_folder(folder / "data")            ? images_in(folder / "data")
-                                                          : images_in(folder);
+  CameraImages images = type_of(list) == fs::file_type::regular ? images_listed_in(list)
+                        : is_folder(folder / "data")            ? images_in(folder / "data")
+                                                                : images_in(folder);
   images.folder = folder;
   if (images.listed && skip_missing) leave_out_missing(images);
   if (images.listed && !skip_missing) require_listed(images);
   return images;
 }
 
-void require_different_folders(const std::vector<Images>& images) {
+void require_different_folders(const std::vector<CameraImages>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     for (std::size_t j = i + 1; j < images.size(); ++j) {
       std::error_code error;
@@ -224,36 +175,41 @@ void leave_out_strays(std::vector<SequenceFrame>& frames) {
   if (are_timed) std::erase_if(frames, std::not_fn(has_time));
 }
 
-/// Of digits alone.
-std::optional<std::int64_t> whole_number(const std::string& digits) {
-  std::int64_t value = 0;
-  const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (!is_number(digits) || result.ec != std::errc()) return std::nullopt;
-  return value;
+bool have_a_common_frame(const std::vector<CameraImages>& images) {
+  const auto& of_first = images.front().of_frames;
+  return std::any_of(of_first.begin(), of_first.end(), [&images](const auto& image) {
+    return std::all_of(images.begin(), images.end(), [&image](const CameraImages& of_camera) {
+      return of_camera.of_frames.contains(image.first);
+    });
+  });
 }
 
 /// The frames of all cameras together.
-std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool allow_incomplete) {
+std::vector<SequenceFrame> frames_of(std::vector<CameraImages> images, bool allow_incomplete,
+                                     double time_tolerance) {
   if (images.empty()) throw Error("A data set has no cameras; give at least one.");
   require_different_folders(images);
-  std::map<std::string, int, InOrder> counts;
-  for (const Images& of_camera : images) {
+  if (time_tolerance > 0) match_by_times(images, time_tolerance);
+  if (!have_a_common_frame(images)) match_by_numbers(images);
+  std::map<std::string, int, NumericalOrder> counts;
+  for (const CameraImages& of_camera : images) {
     for (const auto& [key, path] : of_camera.of_frames) ++counts[key];
   }
   // First of all, as more images or fewer frames would not help.
-  if (std::none_of(counts.begin(), counts.end(), [&](const auto& frame) {
-        return frame.second == static_cast<int>(images.size());
-      })) {
+  if (!have_a_common_frame(images)) {
+    const std::optional<double> apart = least_time_apart(images);
     throw Error("No frame has images of all cameras, beginning with those in " +
                 images.front().folder.string() +
-                "; images of one frame must have equal names or times.");
+                "; images of one frame must have equal names, or numbers in them, or equal times" +
+                (apart ? " (they are " + text_of(static_cast<float>(*apart)) +
+                             " s apart or more: a time tolerance allows that)."
+                       : "."));
   }
-  const bool are_listed = std::any_of(images.begin(), images.end(),
-                                      [](const Images& of_camera) { return of_camera.listed; });
+  const bool are_listed = std::any_of(
+      images.begin(), images.end(), [](const CameraImages& of_camera) { return of_camera.listed; });
   std::vector<SequenceFrame> frames;
   for (const auto& [key, count] : counts) {
     SequenceFrame frame;
-    frame.nanoseconds = are_listed ? whole_number(key) : time_in_name(key);
     for (std::size_t i = 0; i < images.size(); ++i) {
       const auto found = images[i].of_frames.find(key);
       const bool is_there = found != images[i].of_frames.end();
@@ -266,6 +222,7 @@ std::vector<SequenceFrame> frames_of(const std::vector<Images>& images, bool all
       frame.images.push_back(is_there ? found->second : fs::path());
     }
     frame.name = first_image(frame).stem().string();
+    frame.nanoseconds = are_listed ? whole_number(key) : time_in_name(frame.name);
     frames.push_back(std::move(frame));
   }
   require_usable_names(frames);
@@ -313,24 +270,24 @@ bool is_complete(const SequenceFrame& frame) {
 }
 
 std::vector<SequenceFrame> read_sequence(const std::vector<fs::path>& camera_folders,
-                                         bool allow_incomplete) {
-  std::vector<Images> images;
+                                         bool allow_incomplete, double time_tolerance) {
+  std::vector<CameraImages> images;
   for (const fs::path& folder : camera_folders) {
     images.push_back(images_of(folder, allow_incomplete));
   }
-  return frames_of(images, allow_incomplete);
+  return frames_of(std::move(images), allow_incomplete, time_tolerance);
 }
 
 std::vector<SequenceFrame> read_sequence(const fs::path& folder, const std::vector<int>& cameras,
-                                         bool allow_incomplete) {
+                                         bool allow_incomplete, double time_tolerance) {
   if (!is_folder(folder)) {
     throw Error("There is no folder " + folder.string() + "; check the path.");
   }
-  std::vector<Images> images;
+  std::vector<CameraImages> images;
   for (const int camera : cameras) {
     images.push_back(images_of(camera_folder(folder, camera), allow_incomplete));
   }
-  return frames_of(images, allow_incomplete);
+  return frames_of(std::move(images), allow_incomplete, time_tolerance);
 }
 
 }  // namespace widestereo

@@ -169,6 +169,54 @@ TEST_F(Sequences, WhatIsMissingIsNamed) {
   EXPECT_THAT(error({2}), HasSubstr("lists no images"));
 }
 
+/// Names that say the camera, too.
+TEST_F(Sequences, NumbersInNamesTellFramesWhereNamesDiffer) {
+  for (const char* number : {"08", "09", "10"}) {
+    add("cam0/left2_" + std::string(number) + "_a.png");
+    add("cam1/cam1-" + std::string(number) + ".jpg");
+  }
+  const auto frames = read_sequence(folder_.path(), {0, 1});
+  EXPECT_EQ(names(frames), (std::vector<std::string>{"left2_08_a", "left2_09_a", "left2_10_a"}));
+  EXPECT_EQ(frames[2].images[1], folder_ / "cam1/cam1-10.jpg");
+  add("cam1/cam1-11.jpg");
+  EXPECT_THAT(error(), HasSubstr("The frame 11 has no image in " + (folder_ / "cam0").string()));
+  add("cam1/other.jpg");
+  EXPECT_THAT(error(), HasSubstr("must have equal names, or numbers in them, or equal times."));
+  add("cam2/view5_10.png");
+  EXPECT_EQ(names(read_sequence(folder_.path(), {0, 2}, true)),
+            std::vector<std::string>{"left2_10_a"});
+  for (const char* second : {"1500000000", "1500000001"}) {
+    add("cam3/left_" + std::string(second) + ".25.png");
+    add("cam4/right_" + std::string(second) + ".25.png");
+  }
+  EXPECT_EQ(read_sequence(folder_.path(), {3, 4})[1].nanoseconds, 1'500'000'001'250'000'000);
+}
+
+/// As of two drivers that do not know of each other.
+TEST_F(Sequences, ImagesNearInTimeMakeAFrameIfAskedFor) {
+  add("mav0/cam0/data.csv", "1000000,a.png\n2000000,b.png\n3000000,c.png\n");
+  add("mav0/cam1/data.csv", "1001500,x.png\n2001500,y.png\n2999000,z.png\n2998000,early.png\n");
+  for (const char* image : {"cam0/data/a", "cam0/data/b", "cam0/data/c", "cam1/data/x",
+                            "cam1/data/y", "cam1/data/z", "cam1/data/early"}) {
+    add("mav0/" + std::string(image) + ".png");
+  }
+  EXPECT_THAT(error(),
+              HasSubstr("(they are 1e-06 s apart or more: a time tolerance allows that)."));
+  const auto read = [&](double tolerance, bool skip) {
+    return read_sequence(folder_.path(), {0, 1}, skip, tolerance);
+  };
+  EXPECT_THAT(error_of([&] { read(2e-6, false); }), HasSubstr("The frame 2998000 has no image in"));
+  const auto frames = read(2e-6, true);
+  EXPECT_EQ(names(frames), (std::vector<std::string>{"a", "b", "c"}));
+  std::vector<std::string> of_second;
+  for (const SequenceFrame& frame : frames) {
+    if (is_complete(frame)) of_second.push_back(frame.images[1].stem().string());
+  }
+  EXPECT_EQ(of_second, (std::vector<std::string>{"x", "y", "z"})) << "the nearest of each";
+  EXPECT_EQ(frames[0].nanoseconds, 1'000'000);
+  EXPECT_EQ(names(read(1.2e-6, true)), std::vector<std::string>{"c"});
+}
+
 TEST_F(Sequences, ListedFilesThatAreMissingMakeFramesIncomplete) {
   add("mav0/cam0/data.csv", "100,a.png\n200,b.png\n300,c.png\n");
   add("mav0/cam1/data.csv", "100,a.png\n200,b.png\n300,c.png\n");
@@ -411,6 +459,12 @@ TEST_F(Trajectories, BrokenLinesAreNamed) {
   EXPECT_EQ(error_of_text("# timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n"), "");
   EXPECT_THAT(error_of_text("# timestamp tx ty tz qw qx qy qz\n1 2 3 4 1 0 0 0\n"),
               HasSubstr("poses.txt names the quaternion's w first; write qx qy qz qw."));
+  for (const char* comments : {"# timestamp tx ty tz qw qx qy qz\n# exported by a program\n",
+                               "# timestamp,tx,ty,tz,qw,qx,qy,qz\n"}) {
+    EXPECT_THAT(error_of_text(comments + std::string("1 2 3 4 1 0 0 0\n")),
+                HasSubstr("write qx qy qz qw."));
+  }
+  EXPECT_EQ(error_of_text("# this is how we now have what we saw\n1 2 3 4 0 0 0 1\n"), "");
 }
 
 TEST_F(Trajectories, BrokenLinesOfGroundTruthAreNamed) {
@@ -463,10 +517,10 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   frames[0].nanoseconds = 10'204'000'000;
   frames[1].nanoseconds = 10'098'000'000;
   const auto poses = poses_of_frames(frames, {0, 1}, trajectory, 0.01, "p");
-  EXPECT_EQ(poses[0].translation().x(), 2);
-  EXPECT_EQ(poses[1].translation().x(), 1);
+  EXPECT_EQ(poses[0].translation().x(), 2) << "after the last pose";
+  EXPECT_NEAR(poses[1].translation().x(), 0.98, 1e-6);
   frames[1].nanoseconds = 10'104'000'000;
-  EXPECT_EQ(poses_of_frames(frames, {1}, trajectory, 0.01, "p")[0].translation().x(), 1);
+  EXPECT_NEAR(poses_of_frames(frames, {1}, trajectory, 0.01, "p")[0].translation().x(), 1.04, 1e-6);
   frames[1].name = "late";
   frames[1].nanoseconds = 10'150'000'000;
   EXPECT_THAT(error_of([&] {
@@ -486,6 +540,44 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, {}, 0.01, "p"); }),
               HasSubstr("no poses in p"));
+}
+
+/// A body on a helix, whose camera takes images between its poses.
+TEST_F(Trajectories, ArePosesBetweenOthersWhereTheBodyMoves) {
+  const auto truth = [](double seconds) {
+    const double angle = 2 * seconds;
+    return Eigen::AngleAxisd(angle, Eigen::Vector3d(0.6, 0, 0.8)) *
+           Eigen::Translation3d(1.5, 0.1 * angle, 0);
+  };
+  std::vector<StampedPose> trajectory;
+  for (int i = 0; i <= 120; ++i) {
+    const double seconds = 1'500'000'000 + i / 120.0;
+    trajectory.push_back({.seconds = seconds, .world_from_body = truth(i / 120.0)});
+  }
+  std::vector<SequenceFrame> frames(12);
+  std::vector<std::size_t> all(frames.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    all[k] = k;
+    frames[k].nanoseconds = 1'500'000'000'000'000'000 + static_cast<std::int64_t>(k) * 83'000'000;
+  }
+  const auto poses = poses_of_frames(frames, all, trajectory, 0.01, "p");
+  double largest = 0, largest_of_nearest = 0;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const double seconds = 0.083 * static_cast<double>(k);
+    const Eigen::Isometry3d expected(truth(seconds));
+    const Eigen::Isometry3d nearest(truth(std::round(seconds * 120) / 120));
+    largest = std::max(largest, (poses[k].matrix() - expected.matrix()).norm());
+    largest_of_nearest =
+        std::max(largest_of_nearest, (nearest.matrix() - expected.matrix()).norm());
+    EXPECT_TRUE(poses[k].linear().isUnitary(1e-12));
+  }
+  EXPECT_LT(largest, 2e-4);
+  EXPECT_GT(largest_of_nearest, 1e-2);
+}
+
+TEST_F(Trajectories, MayHaveNanosecondsBetweenBlanks) {
+  folder_.write("poses.txt", "1403636579763555584.000000 1 2 3 0 0 0 1\n");
+  EXPECT_NEAR(read_trajectory(folder_ / "poses.txt").poses[0].seconds, 1403636579.763555584, 3e-7);
 }
 
 TEST_F(Trajectories, TwoPosesOfOneTimeMustBeTheSame) {
