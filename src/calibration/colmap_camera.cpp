@@ -99,6 +99,8 @@ Camera camera_of(const ColmapCamera& record, const std::string& name) {
   if (std::string_view(model.name).ends_with("DIVISION")) {
     set_division(camera, camera.beta, name + ": " + model.name);
   }
+  // The model is even in it, so that bundle adjustment may leave either sign.
+  camera.omega = std::abs(camera.omega);
   return simplified(camera);
 }
 

@@ -47,11 +47,21 @@ bool has_frames(const Json& root) {
   return root.is_object() && root.contains("frames") && root["frames"].is_array();
 }
 
+/// What writers leave empty is not there.
+void remove_nulls(Json& object) {
+  if (!object.is_object()) return;
+  for (auto member = object.begin(); member != object.end();) {
+    member = member->is_null() ? object.erase(member) : std::next(member);
+  }
+}
+
 class Reader {
  public:
   explicit Reader(const fs::path& file) : document_{file, {}}, root_(parsed(file)) {
     if (!has_frames(root_)) document_.fail("It has no list \"frames\"; is it damaged?");
     if (root_["frames"].empty()) document_.fail("Its list \"frames\" is empty.");
+    remove_nulls(root_);
+    for (Json& frame : root_["frames"]) remove_nulls(frame);
   }
 
   Transforms read() const {

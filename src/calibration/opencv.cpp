@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "calibration/formats.h"
+#include "geometry/angle.h"
 #include "text/size_text.h"
 
 namespace widestereo::calibration {
@@ -174,7 +175,37 @@ struct CameraKeys {
   Keys k, d, xi;
 };
 
-/// Of the first camera, or the only one, and of the second.
+/// What is of the first camera, or the only one, of the second, and between them.
+constexpr Keys first_matrix = {"K1",
+                               "M1",
+                               "cameraMatrix1",
+                               "camera_matrix_1",
+                               "K_left",
+                               "camera_matrix_left",
+                               "cameraMatrixL",
+                               "K",
+                               "camera_matrix",
+                               "Camera_Matrix",
+                               "cameraMatrix"};
+constexpr Keys second_matrix = {
+    "K2",           "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right",
+    "cameraMatrixR"};
+constexpr Keys first_distortion = {"D1",
+                                   "distCoeffs1",
+                                   "dist_coeffs_1",
+                                   "distortion_coefficients_1",
+                                   "D_left",
+                                   "distortion_left",
+                                   "dist_coeffs_left",
+                                   "distCoeffsL",
+                                   "D",
+                                   "distortion_coefficients",
+                                   "Distortion_Coefficients",
+                                   "distCoeffs"};
+constexpr Keys second_distortion = {
+    "D2",      "distCoeffs2",      "dist_coeffs_2",     "distortion_coefficients_2",
+    "D_right", "distortion_right", "dist_coeffs_right", "distCoeffsR"};
+constexpr Keys rotation_keys = {"R", "rotation", "R_stereo", "rvec", "om"};
 constexpr Keys first_xi = {"xi1", "xi_1", "xi_left", "xi"};
 constexpr Keys second_xi = {"xi2", "xi_2", "xi_right"};
 
@@ -221,8 +252,16 @@ Camera read_lens(const Document& document, const Storage& storage, const CameraK
     camera.p2 = c[3];
     return camera;
   }
-  // Files of cv::stereoCalibrate have five or more.
-  if (c.size() != kannala_brandt_coefficients) return rational_camera(document, what, c);
+  // Files of cv::stereoCalibrate have five or more; those of one camera may say it.
+  const bool four = c.size() == kannala_brandt_coefficients;
+  const cv::Mat says_fisheye = storage.matrix({"fisheye_model"});
+  const bool fisheye = says_fisheye.total() == 1 ? says_fisheye.at<double>(0) != 0 : four;
+  if (fisheye && !four) {
+    document.fail(what + " has " + std::to_string(c.size()) +
+                  " coefficients, but fisheye_model asks for the four of cv::fisheye; correct what "
+                  "is wrong.");
+  }
+  if (!fisheye) return rational_camera(document, what, c);
   set_fisheye(camera, c);
   return camera;
 }
@@ -245,6 +284,18 @@ Camera read_camera(const Document& document, const Storage& storage, const Camer
   return camera;
 }
 
+/// A key of ours, one number for each camera.
+void limit_fields_of_view(Rig& rig, const Document& document, const Storage& storage) {
+  const cv::Mat degrees = storage.matrix({max_theta_key});
+  if (degrees.empty()) return;
+  if (degrees.total() != rig.views.size()) {
+    document.fail(std::string(max_theta_key) + " must hold one number for each camera.");
+  }
+  for (std::size_t i = 0; i < rig.views.size(); ++i) {
+    rig.views[i].camera.max_theta = degrees.at<double>(static_cast<int>(i)) * radians_per_degree;
+  }
+}
+
 Eigen::Isometry3d second_from_first(const Storage& storage, const Document& document) {
   // As OpenCV's sample of stereo with cv::omnidir has them.
   const cv::Mat both = storage.matrix({"extrinsic_parameters"});
@@ -253,7 +304,12 @@ Eigen::Isometry3d second_from_first(const Storage& storage, const Document& docu
     return in_both ? both.reshape(1, 1).colRange(first, first + 3)
                    : storage.required(keys, 3, what);
   };
-  cv::Mat rotation = part({"R", "rotation", "R_stereo", "rvec", "om"}, 0, "rotation");
+  if (both.empty() && storage.matrix(rotation_keys).empty()) {
+    document.fail(
+        "It has two cameras without the rotation (R) and translation (T) between them; add those, "
+        "as from the other file of OpenCV's stereo calibration.");
+  }
+  cv::Mat rotation = part(rotation_keys, 0, "rotation");
   if (rotation.total() == 3) cv::Rodrigues(rotation.clone().reshape(1, 3), rotation);
   const cv::Mat translation = part({"T", "t", "tvec", "translation"}, 3, "translation");
   if (translation.total() != 3) {
@@ -314,6 +370,12 @@ void set_matrix(Camera& camera, const Document& document, const std::string& wha
 Rig read_opencv(const Document& document, cv::Size image_size) {
   try {
     const Storage storage(document);
+    if (storage.matrix(first_matrix).empty()) {
+      document.fail(
+          "It has no camera matrix (K1 or M1, K or camera_matrix); one file must hold both "
+          "cameras' "
+          "matrices and distortions, R and T.");
+    }
     const cv::Size in_file = storage.image_size();
     const cv::Size size = in_file.empty() ? image_size : in_file;
     if (size.empty()) {
@@ -332,38 +394,23 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     rig.views[0].name = "cam0";
     rig.views[1].name = "cam1";
     rig.views[0].camera =
-        read_camera(document, storage,
-                    {"cam0",
-                     {"K1", "M1", "cameraMatrix1", "camera_matrix_1", "K_left",
-                      "camera_matrix_left", "K", "camera_matrix"},
-                     {"D1", "distCoeffs1", "dist_coeffs_1", "distortion_coefficients_1", "D_left",
-                      "distortion_left", "dist_coeffs_left", "D", "distortion_coefficients"},
-                     first_xi},
-                    size);
-    const bool single = storage
-                            .matrix({"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right",
-                                     "camera_matrix_right"})
-                            .empty();
-    if (single) {
+        read_camera(document, storage, {"cam0", first_matrix, first_distortion, first_xi}, size);
+    if (storage.matrix(second_matrix).empty()) {
       if (!storage.matrix(second_xi).empty()) {
         document.fail("It has the second camera's xi without its matrix (K2); add it.");
       }
       rig.views.pop_back();
+      limit_fields_of_view(rig, document, storage);
       return rig;
     }
-    rig.views[1].camera = read_camera(
-        document, storage,
-        {"cam1",
-         {"K2", "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right"},
-         {"D2", "distCoeffs2", "dist_coeffs_2", "distortion_coefficients_2", "D_right",
-          "distortion_right", "dist_coeffs_right"},
-         second_xi},
-        size);
+    rig.views[1].camera =
+        read_camera(document, storage, {"cam1", second_matrix, second_distortion, second_xi}, size);
     if ((rig.views[0].camera.model == CameraModel::mei) !=
         (rig.views[1].camera.model == CameraModel::mei)) {
       document.fail("It has a xi of one camera alone; add the other's (xi1, xi2), or remove it.");
     }
     rig.views[1].world_from_camera = second_from_first(storage, document).inverse();
+    limit_fields_of_view(rig, document, storage);
     return rig;
   } catch (const cv::Exception& error) {
     document.fail("OpenCV cannot read it (" + error.err + ").");

@@ -172,8 +172,12 @@ CalibrationFormat format_of(const Document& document) {
   if (document.contains("opencv-matrix") || document.contains("<opencv_storage")) {
     return CalibrationFormat::opencv;
   }
-  if (document.text[first] == '{') return CalibrationFormat::basalt;
-  if (document.contains("cam0:")) return CalibrationFormat::kalibr;
+  const bool is_json = document.text[first] == '{';
+  // Camchains may have been written as JSON.
+  if (is_json && !document.contains("\"cam0\"") && !document.contains("cam0:")) {
+    return CalibrationFormat::basalt;
+  }
+  if (is_json || document.contains("cam0:")) return CalibrationFormat::kalibr;
   if (document.contains("T_BS")) return CalibrationFormat::euroc;
   if (document.contains("camera_model")) return CalibrationFormat::kalibr;
   document.fail(

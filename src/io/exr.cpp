@@ -93,26 +93,45 @@ Imf::FrameBuffer frame_buffer(cv::Mat& map, const Names& channels, cv::Point ori
   return buffer;
 }
 
+std::int64_t pixels_of(const Imath::Box2i& window) {
+  return (std::int64_t{window.max.x} - window.min.x + 1) *
+         (std::int64_t{window.max.y} - window.min.y + 1);
+}
+
+/// The image, of which a file holds a part (its data) whose first pixel is at `origin`; zero where
+/// it holds nothing.
+cv::Mat within(const cv::Mat& data, cv::Point origin, const Imath::Box2i& image) {
+  const cv::Rect of_data(origin, data.size());
+  const cv::Rect of_image(cv::Point(image.min.x, image.min.y),
+                          cv::Point(image.max.x + 1, image.max.y + 1));
+  if (of_data == of_image) return data;
+  cv::Mat map = cv::Mat::zeros(of_image.size(), data.type());
+  const cv::Rect common = of_data & of_image;
+  data(common - origin).copyTo(map(common - of_image.tl()));
+  return map;
+}
+
 }  // namespace
 
 cv::Mat read_exr(const std::filesystem::path& path, const std::vector<uchar>& bytes) {
   try {
     Bytes stream(path.string(), bytes);
     Imf::InputFile file(stream);
-    const auto& window = file.header().dataWindow();
-    const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
-    const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+    const Imath::Box2i& window = file.header().dataWindow();
+    const Imath::Box2i& image = file.header().displayWindow();
     const Names channels = channels_of_map(file.header());
     if (channels.empty()) {
       throw Error(path.string() +
                   " has neither one channel nor R, G and B or X, Y and Z; write the map alone.");
     }
-    if (width * height > most_pixels) throw std::runtime_error("it has too many pixels");
-    cv::Mat map(static_cast<int>(height), static_cast<int>(width),
+    if (std::max(pixels_of(window), pixels_of(image)) > most_pixels) {
+      throw std::runtime_error("it has too many pixels");
+    }
+    cv::Mat map(window.max.y - window.min.y + 1, window.max.x - window.min.x + 1,
                 CV_MAKETYPE(CV_32F, static_cast<int>(channels.size())));
     file.setFrameBuffer(frame_buffer(map, channels, {window.min.x, window.min.y}));
     file.readPixels(window.min.y, window.max.y);
-    return map;
+    return within(map, {window.min.x, window.min.y}, image);
   } catch (const Error&) {
     throw;
   } catch (const std::bad_alloc&) {

@@ -22,6 +22,7 @@ class TextInput {
     errno = 0;
     stream_.open(path_, std::ios::binary);
     if (!stream_) fail();
+    refuse_utf16();
     skip_byte_order_mark();
   }
 
@@ -48,6 +49,20 @@ class TextInput {
   }
 
  private:
+  /// Begins with a mark that no other text begins with.
+  void refuse_utf16() {
+    const int first = stream_.peek();
+    if (first == 0xff || first == 0xfe) {
+      stream_.get();
+      if (stream_.peek() == (first ^ 1)) {
+        throw Error(path_.string() + " is text in UTF-16; save it as UTF-8.");
+      }
+      stream_.unget();
+    }
+    require_read();
+    stream_.clear();
+  }
+
   void skip_byte_order_mark() {
     bool at_start = true;
     for (const int byte : {0xef, 0xbb, 0xbf}) {

@@ -186,6 +186,7 @@ TEST_F(Colmap, ConvertsEveryModelWithAnEquivalent) {
   EXPECT_EQ(rational.k3, 0.5);
   EXPECT_EQ(rational.k6, 0.8);
   EXPECT_EQ(camera("FOV 8 8 2 3 4 4 0.9").omega, 0.9);
+  EXPECT_EQ(camera("FOV 8 8 2 3 4 4 -0.9").omega, 0.9) << "its sign means nothing";
   EXPECT_EQ(camera("SIMPLE_RADIAL_FISHEYE 8 8 2 4 4 0.1").k1, 0.1);
   EXPECT_EQ(camera("RADIAL_FISHEYE 8 8 2 4 4 0.1 0.2").k2, 0.2);
   EXPECT_EQ(camera("THIN_PRISM_FISHEYE 8 8 2 3 4 4 0.1 0.2 0 0 0.3 0.4 0 0").k4, 0.4);

@@ -135,6 +135,19 @@ TEST_F(Nerfstudio, FramesMayHaveTheirOwnCamerasAndMasks) {
   EXPECT_FALSE(model.calibrated({0}).in_metres);
 }
 
+TEST_F(Nerfstudio, NullMeansThatSomethingIsNotThere) {
+  const View seen =
+      view(file(R"("camera_model": null, "w": 96, "h": 80, "fl_x": 60, "fl_y": null, "cx": 47)",
+                frame("a.png", R"(, "mask_path": null, "fl_x": null, "k1": null)")));
+  EXPECT_EQ(seen.camera.model, CameraModel::pinhole_radtan);
+  EXPECT_EQ(seen.camera.fx, 60);
+  EXPECT_EQ(seen.camera.fy, 60);
+  EXPECT_TRUE(seen.mask.empty());
+  EXPECT_NE(error(file(fisheye, R"({"file_path": null, "transform_matrix": [[1]]})"))
+                .find("\"file_path\" is missing"),
+            std::string::npos);
+}
+
 /// Names are those of folders of results, too.
 TEST_F(Nerfstudio, ImagesMayLieOutsideOfTheFolder) {
   const SfmModel model =

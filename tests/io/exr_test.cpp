@@ -21,12 +21,11 @@
 namespace widestereo::test {
 namespace {
 
-/// Writes all of the channels with the same values, which a half has, too.
-void write_channels(const std::filesystem::path& path, const cv::Mat_<float>& values,
-                    const std::vector<const char*>& names, Imf::PixelType type, cv::Point origin) {
-  const Imath::Box2i window({origin.x, origin.y},
-                            {origin.x + values.cols - 1, origin.y + values.rows - 1});
-  Imf::Header header(Imath::Box2i({0, 0}, {99, 99}), window);
+/// Writes all of the channels with the same values, which a half has, too, as `part` of an image.
+void write_part(const std::filesystem::path& path, const cv::Mat_<float>& values,
+                const std::vector<const char*>& names, Imf::PixelType type,
+                const Imath::Box2i& window, const Imath::Box2i& image) {
+  Imf::Header header(image, window);
   Imf::FrameBuffer buffer;
   std::vector<cv::Mat> kept;
   for (const char* name : names) {
@@ -39,6 +38,14 @@ void write_channels(const std::filesystem::path& path, const cv::Mat_<float>& va
   Imf::OutputFile file(path.c_str(), header);
   file.setFrameBuffer(buffer);
   file.writePixels(values.rows);
+}
+
+/// The same, as all of an image.
+void write_channels(const std::filesystem::path& path, const cv::Mat_<float>& values,
+                    const std::vector<const char*>& names, Imf::PixelType type, cv::Point origin) {
+  const Imath::Box2i window({origin.x, origin.y},
+                            {origin.x + values.cols - 1, origin.y + values.rows - 1});
+  write_part(path, values, names, type, window, window);
 }
 
 const cv::Mat_<float> four = (cv::Mat_<float>(2, 2) << 1.5f, 2.25f, 0, 40);
@@ -77,6 +84,23 @@ TEST(Exr, MayHaveHalfFloatsAnyOriginAndAnAlpha) {
       }
     }
   }
+}
+
+/// As renderers crop what is empty around.
+TEST(Exr, HoldsAPartOfTheImage) {
+  const TemporaryFolder folder;
+  const auto read = [&](const Imath::Box2i& image) {
+    write_part(folder / "part.exr", four, {"Y"}, Imf::FLOAT, {{3, 1}, {4, 2}}, image);
+    return read_map(folder / "part.exr");
+  };
+  cv::Mat_<float> whole(4, 6, 0.0f);
+  four.copyTo(whole(cv::Rect(3, 1, 2, 2)));
+  EXPECT_TRUE(same_bits(read({{0, 0}, {5, 3}}), whole));
+  EXPECT_TRUE(same_bits(read({{4, 1}, {6, 1}}), cv::Mat_<float>({1, 3}, {2.25f, 0.0f, 0.0f})));
+  EXPECT_NE(error_of([&] {
+              read({{0, 0}, {1 << 20, 1 << 20}});
+            }).find("too many pixels"),
+            std::string::npos);
 }
 
 TEST(Exr, OfOtherChannelsOrNoneIsRefused) {
