@@ -14,7 +14,7 @@ struct CalibrationOutput {
   void add_format_to(CLI::App& command);
   /// Throws Error where write() would for the rig, not for the file.
   void require_form(const widestereo::Rig& rig) const;
-  /// As write_kalibr() or write_basalt() does.
+  /// As write_kalibr(), write_basalt() or write_opencv() does.
   void write(const widestereo::Rig& rig) const;
 
  private:

@@ -51,7 +51,8 @@ double number(const Document& document, const Json& object, const std::string& k
 
 const Json& list(const Document& document, const Json& object, const char* key) {
   if (!object.is_object() || !object.contains(key) || !object.at(key).is_array()) {
-    document.fail(std::string("The list \"") + key + "\" is missing.");
+    document.fail(std::string("The list \"") + key +
+                  "\" of a Basalt calibration is missing; add it, or give another format.");
   }
   return object.at(key);
 }
@@ -120,8 +121,8 @@ int side(const Document& document, const Json& value) {
   return *pixels;
 }
 
-Json basalt_form(const View& view, const std::filesystem::path& path) {
-  const Camera& c = view.camera;
+/// None where Basalt lacks the model.
+std::optional<Json> form_of(const Camera& c) {
   const double f = c.model == CameraModel::unified ? 1 / (1 + c.xi) : 1;
   Json values = {{"fx", c.fx * f}, {"fy", c.fy * f}, {"cx", c.cx}, {"cy", c.cy}};
   const bool has_form = c.skew == 0 && c.s1 == 0 && c.s2 == 0 && c.s3 == 0 && c.s4 == 0;
@@ -162,12 +163,19 @@ Json basalt_form(const View& view, const std::filesystem::path& path) {
       values[largest_radius_key] = c.max_theta < std::numbers::pi / 2 ? std::tan(c.max_theta) : 0;
       break;
     default:
-      throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
-                  (c.skew != 0 ? " with skew" : "") +
-                  ") has no form in Basalt's format; Kalibr's holds mei and equirectangular "
-                  "cameras without skew.");
+      return std::nullopt;
   }
-  return {{"camera_type", type}, {"intrinsics", values}};
+  return Json{{"camera_type", type}, {"intrinsics", values}};
+}
+
+Json basalt_form(const View& view, const std::filesystem::path& path) {
+  const Camera& c = view.camera;
+  const std::optional<Json> form = form_of(c);
+  if (!form) {
+    throw Error("Cannot write " + path.string() + ": " +
+                no_form(view, CalibrationFormat::basalt, c.skew != 0 ? "skew" : ""));
+  }
+  return *form;
 }
 
 /// Basalt has one for all cameras, each of which Kalibr estimates by itself.
@@ -185,6 +193,8 @@ long long time_offset_form(const Rig& rig, const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+bool has_basalt_form(const Camera& camera) { return form_of(camera).has_value(); }
 
 Rig read_basalt(const Document& document) {
   try {

@@ -30,6 +30,13 @@ struct Document {
 /// IMU.
 void add_view_of_body(Rig& rig, View view, const Eigen::Isometry3d& body_from_camera);
 
+bool has_kalibr_form(const Camera& camera);
+bool has_basalt_form(const Camera& camera);
+bool has_opencv_form(const Camera& camera);
+/// What an error says of a view that the format cannot hold: which other one can. `more`: what the
+/// format lacks besides the model.
+std::string no_form(const View& view, CalibrationFormat format, const std::string& more = "");
+
 Rig read_kalibr(const Document& document);
 Rig read_basalt(const Document& document);
 Rig read_opencv(const Document& document, cv::Size image_size);

@@ -94,6 +94,13 @@ std::vector<std::string> texts_of(const std::vector<T>& numbers) {
   return texts;
 }
 
+/// A number beyond those of Kalibr's form of the model.
+bool has_skew_or_k3(const Camera& c) {
+  const bool third_of_radtan =
+      c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei;
+  return c.skew != 0 || (third_of_radtan && c.k3 != 0);
+}
+
 /// None where Kalibr lacks the model.
 std::optional<KalibrForm> form_of(const Camera& c) {
   const std::vector<double> f = {c.fx, c.fy, c.cx, c.cy};
@@ -133,21 +140,19 @@ std::optional<KalibrForm> form_of(const Camera& c) {
 KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
   const Camera& c = view.camera;
   const std::optional<KalibrForm> form = form_of(c);
-  if (!form) {
-    throw Error("Cannot write " + path.string() + ": " + view.name + " (" + to_string(c.model) +
-                ") has no form in Kalibr's format; Basalt's holds pinhole_rational cameras without "
-                "prisms.");
-  }
-  const bool third_of_radtan =
-      c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei;
-  if (c.skew != 0 || (third_of_radtan && c.k3 != 0)) {
-    throw Error("Cannot write " + path.string() + ": " + view.name +
-                " has a skew or a k3, which Kalibr's format cannot hold.");
+  if (!form || has_skew_or_k3(c)) {
+    throw Error("Cannot write " + path.string() + ": " +
+                no_form(view, CalibrationFormat::kalibr, form ? "a skew or a k3" : ""));
   }
   return *form;
 }
 
 }  // namespace
+
+bool has_kalibr_form(const Camera& camera) {
+  return form_of(camera).has_value() && !has_skew_or_k3(camera);
+}
+
 }  // namespace calibration
 
 std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {

@@ -265,6 +265,23 @@ TEST(Kalibr, ReadsPosesThatOnlyTheImuGives) {
       1e-9);
 }
 
+/// As YAML's parsers read JSON, and write it where asked for one line.
+TEST(Kalibr, MayBeWrittenAsJson) {
+  const TemporaryFolder folder;
+  const std::string camera =
+      R"("camera_model": "ds", "intrinsics": [-0.17, 0.59, 157, 158, 254, 256], "distortion_model": )"
+      R"("none", "distortion_coeffs": [], "resolution": [512, 512])";
+  const std::string flow =
+      "{cam0: {camera_model: ds, intrinsics: [-0.17, 0.59, 157, 158, 254, 256], "
+      "distortion_model: none, distortion_coeffs: [], resolution: [512, 512]}}\n";
+  for (const std::string& text : {"{\"cam0\": {" + camera + "}}", flow}) {
+    const Calibration c = read_calibration(folder.write("chain.json", text));
+    EXPECT_EQ(c.format, CalibrationFormat::kalibr);
+    EXPECT_EQ(c.rig.views.at(0).camera.model, CameraModel::double_sphere);
+    EXPECT_EQ(c.rig.views.at(0).camera.alpha, 0.59);
+  }
+}
+
 TEST(Basalt, MayBeginWithAByteOrderMark) {
   const TemporaryFolder folder;
   const auto path = folder.write("calib.json", "\xef\xbb\xbf" + std::string(basalt_text));
@@ -313,6 +330,48 @@ TEST(OpenCv, ReadsFisheyeStereo) {
   EXPECT_EQ(left.width, 1280);
   // X_right = R X_left + T with T.x negative: the right camera is to the right.
   EXPECT_NEAR(c.rig.views[1].world_from_camera.translation().x(), 0.125, 1e-12);
+}
+
+/// OpenCV's own sample of stereo calibration writes two files.
+TEST(OpenCv, OfWhichAPartIsMissingIsNamed) {
+  const TemporaryFolder folder;
+  const std::string text = opencv_text;
+  const std::size_t rotation = text.find("R:");
+  ASSERT_NE(rotation, std::string::npos);
+  const auto expect = [&](const std::string& part, const char* message) {
+    const std::string error = error_of(folder.write("part.yml", part));
+    EXPECT_NE(error.find(message), std::string::npos) << error;
+  };
+  expect(text.substr(0, rotation) + "image_width: 1280\nimage_height: 960\n",
+         "two cameras without the rotation (R)");
+  expect("%YAML:1.0\n---\n" + text.substr(rotation), "no camera matrix (K1 or M1");
+}
+
+/// OpenCV's sample of calibration says what a camera is.
+TEST(OpenCv, AreFisheyesWhereTheFileSaysSo) {
+  const TemporaryFolder folder;
+  const auto file = [&](int fisheye, const std::string& coefficients,
+                        const char* matrix = "camera_matrix",
+                        const char* distortion = "distortion_coefficients") {
+    return folder.write("camera.yml",
+                        "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\nfisheye_model: " +
+                            std::to_string(fisheye) + "\n" + matrix +
+                            ": !!opencv-matrix { rows: 3, cols: 3, dt: d, data: [ 300, 0, 320, 0, "
+                            "300, 240, 0, 0, 1 ] }\n" +
+                            distortion + ": [ " + coefficients + " ]\n");
+  };
+  const auto model = [&](const std::filesystem::path& path) {
+    return read_calibration(path).rig.views[0].camera.model;
+  };
+  EXPECT_EQ(model(file(1, "0.01, 0.02, 0, 0")), CameraModel::kannala_brandt);
+  EXPECT_EQ(model(file(0, "0.01, 0.02, 0, 0")), CameraModel::pinhole_radtan);
+  EXPECT_EQ(model(file(0, "0.01, 0.02, 0, 0, 0")), CameraModel::pinhole_radtan);
+  EXPECT_NE(error_of(file(1, "0.01, 0.02, 0, 0, 0")).find("fisheye_model asks for the four"),
+            std::string::npos);
+  for (const auto& [matrix, distortion] : {std::pair("Camera_Matrix", "Distortion_Coefficients"),
+                                           std::pair("cameraMatrix", "distCoeffs")}) {
+    EXPECT_EQ(model(file(1, "0.01, 0.02, 0, 0", matrix, distortion)), CameraModel::kannala_brandt);
+  }
 }
 
 TEST(OpenCv, TakesTheSizeFromTheImages) {
@@ -517,9 +576,7 @@ TEST(OpenCv, ReadsMatricesWithinOneMap) {
   }
   // Nobody could tell which of two is meant.
   const std::string twice = within + within_map("others", opencv_text).substr(14);
-  EXPECT_NE(error_of(folder.write("twice.yml", twice)).find("no image size"), std::string::npos);
-  const std::string with_size = replaced(twice, "---\n", "---\nimage_size: [ 1280, 960 ]\n");
-  EXPECT_NE(error_of(folder.write("matrices.yml", with_size)).find("camera matrix (K1"),
+  EXPECT_NE(error_of(folder.write("twice.yml", twice)).find("no camera matrix (K1"),
             std::string::npos);
   EXPECT_NE(error_of(folder.write("xi.yml", within + "   xi_l: 1.2\n")).find("correct xi_l"),
             std::string::npos);
@@ -752,6 +809,67 @@ TEST_P(WritingCameras, AsBasaltDoes) {
   expect_held(!has_no_form.contains(c.model) && c.skew == 0 && c.s1 == 0, write_basalt);
 }
 
+TEST_P(WritingCameras, AsOpenCvDoes) {
+  const CameraModel model = GetParam().camera.model;
+  // They come back as Mei cameras and with a distortion of zero.
+  if (model == CameraModel::unified || model == CameraModel::pinhole) return;
+  const std::set<CameraModel> has_form = {CameraModel::pinhole_radtan,
+                                          CameraModel::pinhole_rational,
+                                          CameraModel::kannala_brandt, CameraModel::mei};
+  expect_held(has_form.contains(model), write_opencv);
+}
+
+/// OpenCV itself reads it.
+TEST(Writing, OpenCvFilesAreThoseOfItsCalibrations) {
+  const TemporaryFolder folder;
+  const Rig rig = read_calibration(folder.write("stereo.yml", opencv_text)).rig;
+  for (const char* name : {"again.yml", "again.xml", "again.json"}) {
+    write_opencv(folder / name, rig);
+    const cv::FileStorage before(opencv_text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    const cv::FileStorage file((folder / name).string(), cv::FileStorage::READ);
+    for (const char* key : {"K1", "K2", "R", "T", "D1", "D2"}) {
+      const cv::Mat expected = before[key].mat().reshape(1, 1);
+      const cv::Mat found = file[key].mat().reshape(1, 1);
+      ASSERT_EQ(found.size(), expected.size()) << name << " " << key;
+      EXPECT_LT(cv::norm(found, expected, cv::NORM_INF), 1e-15) << name << " " << key;
+    }
+    EXPECT_EQ(static_cast<int>(file["image_width"]), 1280);
+  }
+  Rig one = rig;
+  one.views.pop_back();
+  write_opencv(folder / "one.yml", one);
+  EXPECT_EQ(read_calibration(folder / "one.yml").rig.views.size(), 1u);
+  Rig unified = one;
+  unified.views[0].camera = Camera{};
+  unified.views[0].camera.model = CameraModel::unified;
+  unified.views[0].camera.xi = 0.9;
+  unified.views[0].camera.fx = unified.views[0].camera.fy = 300;
+  unified.views[0].camera.width = unified.views[0].camera.height = 400;
+  unified.views[0].camera.cx = unified.views[0].camera.cy = 200;
+  write_opencv(folder / "unified.yml", unified);
+  EXPECT_EQ(read_calibration(folder / "unified.yml").rig.views[0].camera.xi, 0.9);
+
+  const auto expect = [&](const Rig& bad, const char* part) {
+    const std::string error = test::error_of([&] { write_opencv(folder / "bad.yml", bad); });
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+    EXPECT_FALSE(std::filesystem::exists(folder / "bad.yml"));
+  };
+  Rig bad = rig;
+  bad.views.push_back(bad.views.back());
+  bad.views.back().world_from_camera.translation().x() += 1;
+  expect(bad, "two cameras at most, but the rig has 3");
+  bad = rig;
+  bad.world_from_imu = camera_beside_imu();
+  expect(bad, "cannot say where the IMU is");
+  bad = rig;
+  bad.views[1].camera.width = 640;
+  expect(bad, "cameras of one image size");
+  bad = rig;
+  bad.views[1].camera.model = CameraModel::mei;
+  bad.views[1].camera.k3 = bad.views[1].camera.k4 = 0;
+  expect(bad, "cam0 is kannala_brandt and cam1 is mei");
+}
+
 INSTANTIATE_TEST_SUITE_P(Models, WritingCameras, ::testing::ValuesIn(test::cameras()),
                          [](const auto& test) { return std::string(test.param.name); });
 
@@ -789,6 +907,36 @@ TEST(Writing, PanoramasGoToKalibrAlone) {
   }
   EXPECT_NE(test::error_of([&] { write_basalt(folder / "a.json", rig); }).find("equirectangular"),
             std::string::npos);
+}
+
+TEST(Writing, NamesTheOtherFormatWhereThatHoldsTheCamera) {
+  const TemporaryFolder folder;
+  Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  Camera& camera = rig.views[0].camera;
+  const Camera whole = camera;
+  const auto expect = [&](CameraModel model, double skew, const char* kalibr, const char* basalt) {
+    camera = whole;
+    camera.model = model;
+    camera.k3 = 0;
+    camera.skew = skew;
+    const auto expect_end = [&](const char* end,
+                                void (*write)(const std::filesystem::path&, const Rig&)) {
+      const std::string error = test::error_of([&] { write(folder / "again", rig); });
+      EXPECT_TRUE(error.ends_with(end)) << error;
+    };
+    expect_end(kalibr, write_kalibr);
+    expect_end(basalt, write_basalt);
+  };
+  expect(CameraModel::pinhole_rational, 0,
+         "(pinhole_rational) has no form in Kalibr's format; choose Basalt's or OpenCV's.", "");
+  expect(CameraModel::mei, 0, "",
+         "(mei) has no form in Basalt's format; choose Kalibr's or OpenCV's.");
+  expect(CameraModel::kannala_brandt, 0.1,
+         "with a skew or a k3) has no form in Kalibr's format; choose OpenCV's.",
+         "with skew) has no form in Basalt's format; choose OpenCV's.");
+  expect(CameraModel::double_sphere, 0.1,
+         "in Kalibr's format; no other that is written has one, so keep the file that it is from.",
+         "in Basalt's format; no other that is written has one, so keep the file that it is from.");
 }
 
 // As calibrations of Windows Mixed Reality's headsets.
@@ -880,6 +1028,16 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect("", "empty");
   expect("hello world\n", "no calibration");
   expect(std::string("\x89PNG\r\n\x1a\n\0\0\0", 11), "no calibration");
+  expect("\xff\xd8\xff\xe0", "no calibration");
+  expect(std::string("\xff\xfe"
+                     "c\0a\0m\0"
+                     "0\0",
+                     10),
+         "is text in UTF-16; save it as UTF-8.");
+  expect(std::string("\xfe\xff\0c\0a\0m\0"
+                     "0",
+                     10),
+         "is text in UTF-16; save it as UTF-8.");
   expect("cam0: 5\n", "camera_model");
   expect("cam0: [1\n", "YAML");
   expect("camera_model: pinhole\n", "no cameras");
