@@ -9,6 +9,9 @@
 #include <span>
 #include <string>
 
+#include "widestereo/eigen_layout.h"
+#include "widestereo/error.h"
+
 namespace widestereo {
 
 /// Central camera models. The values are those of the kernels (shaders/camera.glsl).

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "widestereo/error.h"
+
 namespace widestereo {
 
 enum class DeviceKind { cpu, vulkan, cuda };

@@ -5,6 +5,8 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
+#include "widestereo/error.h"
+
 namespace widestereo {
 
 /// Reads an 8- or 16-bit image, grey, BGR or BGRA, depth kept. Throws Error (missing, truncated,

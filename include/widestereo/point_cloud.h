@@ -7,6 +7,9 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "widestereo/eigen_layout.h"
+#include "widestereo/error.h"
+
 namespace widestereo {
 
 struct CloudPoint {
