@@ -205,6 +205,23 @@ struct Comparison {
   int reasons;
 };
 
+// From the nearest plane of the sources that tell distances, or of the others where none of those has one.
+FN vec2 difference_from_nearest(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) {
+  vec2 nearest = vec2(UNKNOWN_DIFFERENCE, UNKNOWN_DIFFERENCE);
+  vec2 nearest_of_others = nearest;
+  float longest = longest_squared_baseline_across(CONTEXT ray);
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    int source = source_at(CONTEXT i);
+    vec2 candidate = difference_from_source(CONTEXT source, pixel, ray, m);
+    if (tells_distance(CONTEXT source, ray, longest)) {
+      if (candidate.y < nearest.y) nearest = candidate;
+    } else if (candidate.y < nearest_of_others.y) {
+      nearest_of_others = candidate;
+    }
+  }
+  return nearest.y < UNKNOWN_DIFFERENCE ? nearest : nearest_of_others;
+}
+
 // False where the pixel has no plane; `difference` and `reasons` say so, too.
 FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
@@ -225,10 +242,7 @@ FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
     return false;
   }
   c.speed = speed_in_sources(CONTEXT pixel, c.ray, c.w);
-  for (int i = 0; i < SOURCE_COUNT; ++i) {
-    vec2 candidate = difference_from_source(CONTEXT source_at(CONTEXT i), pixel, c.ray, m);
-    if (candidate.y < c.difference.y) c.difference = candidate;
-  }
+  c.difference = difference_from_nearest(CONTEXT pixel, c.ray, m);
   c.support = support_of_surroundings(CONTEXT pixel, c.ray, c.w, c.speed);
   vec4 limits = PARAMETERS.check_limits;
   float least_variance = PARAMETERS.patch_limits.x;

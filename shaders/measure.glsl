@@ -64,8 +64,10 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
   // Of those in which the point lands it is the fastest, and in others nothing agrees.
   if (difference_from_source(CONTEXT chosen, pixel, ray, m).y <= limit) return chosen;
   float fastest = 0.0f;
+  float longest = longest_squared_baseline_across(CONTEXT ray);
   for (int i = 0; i < SOURCE_COUNT; ++i) {
     int source = source_at(CONTEXT i);
+    if (!tells_distance(CONTEXT source, ray, longest)) continue;
     vec2 v = source_velocity(CONTEXT source, ray, w);
     float speed = length(v);
     if (speed <= fastest || difference_from_source(CONTEXT source, pixel, ray, m).y > limit) continue;

@@ -450,14 +450,24 @@ FN float source_cost(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m) {
   return zncc_cost(n, sum_a, sum_b, sum_aa, sum_bb, sum_ab, PARAMETERS.patch_limits.x);
 }
 
-// Mean over the best sources that see the patch; INVALID_COST when none does.
+// Mean over the best sources that see the patch, of those that tell distances if any of them does; INVALID_COST when none
+// sees it.
 FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
   if (ONE_SOURCE) return source_cost(CONTEXT source_at(CONTEXT 0), pixel, m);
+  vec4 of_pixel = ray_at(CONTEXT REFERENCE, pixel);
+  vec3 ray = vec3(of_pixel.x, of_pixel.y, of_pixel.z);
+  float longest = longest_squared_baseline_across(CONTEXT ray);
+  float best_of_others = INVALID_COST;
   float best[MAX_IMAGES];
   int count = 0;
   for (int i = 0; i < SOURCE_COUNT; ++i) {
-    float cost = source_cost(CONTEXT source_at(CONTEXT i), pixel, m);
+    int source = source_at(CONTEXT i);
+    float cost = source_cost(CONTEXT source, pixel, m);
     if (cost >= INVALID_COST) continue;
+    if (!tells_distance(CONTEXT source, ray, longest)) {
+      best_of_others = min(best_of_others, cost);
+      continue;
+    }
     int place = count;
     while (place > 0 && best[place - 1] > cost) {
       best[place] = best[place - 1];
@@ -467,7 +477,7 @@ FN float patch_cost(CONTEXT_ARGUMENT ivec2 pixel, vec3 m) {
     ++count;
   }
   count = min(count, PARAMETERS.search.z);
-  if (count == 0) return INVALID_COST;
+  if (count == 0) return best_of_others;
   float sum = 0.0f;
   for (int i = 0; i < count; ++i) sum += best[i];
   return sum / float(count);

@@ -48,6 +48,32 @@ FN vec3 direction_in_source(ViewPair pair, vec3 ray, float w) {
   return rotate(pair, ray) + w * translation(pair);
 }
 
+// Square of the share of the longest baseline across a ray below which a source tells next to nothing of distances there:
+// all of them match, so that its cost would be the best.
+#define LEAST_SQUARED_SHARE_OF_BASELINE 0.0025f
+
+// Square of the part of a source's baseline that is across the ray, by which its points move as their distance changes.
+FN float squared_baseline_across(CONTEXT_ARGUMENT int source, vec3 ray) {
+  ViewPair pair = pair_between(CONTEXT REFERENCE, source);
+  vec3 across = cross(translation(pair), rotate(pair, ray));
+  return dot(across, across);
+}
+
+// The longest of all sources.
+FN float longest_squared_baseline_across(CONTEXT_ARGUMENT vec3 ray) {
+  float longest = 0.0f;
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    longest = max(longest, squared_baseline_across(CONTEXT source_at(CONTEXT i), ray));
+  }
+  return longest;
+}
+
+// Whether the source tells enough of the ray's distance, `longest` being that of all sources.
+FN bool tells_distance(CONTEXT_ARGUMENT int source, vec3 ray, float longest) {
+  if (SOURCE_COUNT == 1) return true;
+  return squared_baseline_across(CONTEXT source, ray) >= LEAST_SQUARED_SHARE_OF_BASELINE * longest;
+}
+
 // Maps reference rays into a source through one plane: rows of the plane's homography R + t m^T, which takes fewer
 // operations a ray than direction_in_source().
 struct PlaneWarp {

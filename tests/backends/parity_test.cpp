@@ -548,6 +548,25 @@ TEST_P(EveryDevice, UsesThreeViews) {
   expect_no_validation_messages(*device);
 }
 
+// As where a moving camera stood still: what such a view shows fits every distance.
+TEST_P(EveryDevice, AViewThatHardlyMovedMisleadsNoOther) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Rig rig = demo_rig(96);
+  rig.views.push_back(rig.views[0]);
+  rig.views[2].name = "again";
+  rig.views[2].world_from_camera.translation().x() += 5e-4;
+  const RenderedPair pair = render_demo_room(rig);
+  std::vector<cv::Mat> images = images_of(pair);
+  images[2] = images[0].clone();
+  Options options = Options::preset_named("fast");
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  const StereoResult result = Matcher(*device, rig, options).match(images);
+  const std::vector<RegionScores> scores =
+      evaluate(result.views[0].distance, {}, pair.views[0].truth, rig.views[0], rig.views[1]);
+  EXPECT_LT(scores[1].bad_pixels.at(1.0), 0.05) << to_table(scores);
+  expect_no_validation_messages(*device);
+}
+
 TEST_P(EveryDevice, RejectsWhatItCannotMatch) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());
   const RenderedPair pair = render_demo(64);
