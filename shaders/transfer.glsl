@@ -19,7 +19,8 @@ FN bool forward_warp(CONTEXT_ARGUMENT ivec2 p, OUT(ivec2) corner, OUT(float) inv
   inverse_distance = 0.0f;
   vec4 ray = ray_at(CONTEXT OTHER, p);
   vec4 plane = hypothesis_at(CONTEXT OTHER, p);
-  if (ray.w == 0.0f || plane.w >= INVALID_COST) return false;
+  // A cost that is no number would never be undercut.
+  if (ray.w == 0.0f || !(plane.w < INVALID_COST)) return false;
   ViewPair pair = pair_between(CONTEXT OTHER, REFERENCE);
   CameraParameters camera = PARAMETERS.cameras[REFERENCE];
   vec3 m = vec3(plane.x, plane.y, plane.z);

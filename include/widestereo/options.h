@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "widestereo/error.h"
+
 namespace widestereo {
 
 /// How a patch is mapped into a source image (values of the kernels, shaders/parameters.glsl).
@@ -57,7 +59,9 @@ enum class SearchMethod : int {
 /// "exact" or "device".
 std::string to_string(Filter filter);
 
-/// Parameters of a match. Start from a preset and change what you need.
+/// Parameters of a match. Start from a preset, as Options::preset_named("quality"), and change what
+/// you need: what is not set is that of `paper`, the algorithm as published, which is slower and
+/// less accurate.
 struct Options {
   /// What distances may be: the matcher squares them, and their inverses, in single precision.
   static constexpr double least_distance = 1e-6, most_distance = 1e9;
@@ -66,7 +70,8 @@ struct Options {
 
   std::string preset = "paper";
   double min_distance = 0.3;  ///< metres along the ray, at least least_distance
-  double max_distance = 50;   ///< metres along the ray, > min_distance, at most most_distance
+  double max_distance = 50;  ///< metres along the ray, more than min_distance by a share of 1e-5 at
+                             ///< least, at most most_distance
   std::uint32_t seed = 1;
 
   SearchMethod search = SearchMethod::random;

@@ -273,7 +273,8 @@ class Alignment {
   static Eigen::VectorXd solve(const NormalEquations& equations) {
     Eigen::MatrixXd damped = equations.information;
     damped.diagonal() *= 1 + 1e-6;
-    damped.diagonal().array() += 1e-9;
+    // Not of the motion, whose unit of length nothing here knows.
+    damped.diagonal().tail(damped.rows() - 6).array() += 1e-9;
     return -damped.ldlt().solve(equations.gradient);
   }
 

@@ -75,7 +75,9 @@ Options Options::preset_named(const std::string& name) {
 std::vector<std::string> Options::preset_names() { return {"fast", "quality", "paper"}; }
 
 void validate(const Options& o) {
-  if (!(o.min_distance >= Options::least_distance && o.min_distance < o.max_distance &&
+  constexpr double least_ratio = 1 + 1e-5;  // single precision still has both
+  if (!(o.min_distance >= Options::least_distance &&
+        o.min_distance * least_ratio <= o.max_distance &&
         o.max_distance <= Options::most_distance)) {
     throw Error("The distance range from " + text(o.min_distance) + " to " + text(o.max_distance) +
                 " m is not usable: give a nearest distance and a larger "

@@ -262,6 +262,28 @@ TEST(Motion, IsFoundToAFractionOfAPixel) {
   }
 }
 
+TEST(Motion, IsTheSameInEveryUnitOfLength) {
+  const std::vector<cv::Mat> images = images_of(frame(1));
+  const auto found =
+      estimate_motion(frame(0).rig, images_of(frame(0)), true_planes(frame(0)), images);
+  ASSERT_TRUE(found.has_value());
+  for (const double unit : {1e-6, 1e7}) {
+    Rig rig = frame(0).rig;
+    for (View& view : rig.views) view.world_from_camera.translation() *= unit;
+    std::vector<ViewResult> planes = true_planes(frame(0));
+    for (ViewResult& view : planes) {
+      view.hypotheses.forEach<cv::Vec4f>([unit](cv::Vec4f& plane, const int*) {
+        const auto scale = static_cast<float>(1 / unit);
+        plane = {scale * plane[0], scale * plane[1], scale * plane[2], plane[3]};
+      });
+    }
+    const auto motion = estimate_motion(rig, images_of(frame(0)), planes, images);
+    ASSERT_TRUE(motion.has_value());
+    EXPECT_LT((motion->linear() - found->linear()).norm(), 1e-5);
+    EXPECT_LT((motion->translation() / unit - found->translation()).norm(), 1e-5);
+  }
+}
+
 TEST(Motion, NeedsARigThatIsValid) {
   Rig rig = frame(0).rig;
   rig.views[1].camera.fx = -1;

@@ -36,6 +36,20 @@ TEST(Options, NumbersThatAreNotFiniteAreNamed) {
   EXPECT_THAT(error(&Options::max_distance, infinity), HasSubstr("to infinity m is not usable"));
 }
 
+/// In single precision, as kernels have them: confidences would be no numbers.
+TEST(Options, NearestAndFarthestDistanceMustDiffer) {
+  const auto error = [](double farthest) {
+    Options options;
+    options.min_distance = 2;
+    options.max_distance = farthest;
+    return error_of_options(options);
+  };
+  EXPECT_EQ(error(2.0001), "");
+  for (const double farthest : {1.0, 2.0, 2.00000001}) {
+    EXPECT_THAT(error(farthest), HasSubstr("is not usable: give a nearest distance and a larger"));
+  }
+}
+
 TEST(Options, RasterOrderBelongsToTheRandomSearch) {
   Options options = Options::preset_named("fast");
   options.propagation = Propagation::raster;
