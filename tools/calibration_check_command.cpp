@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
 #include "calibration_commands.h"
+#include "matching_run.h"
 #include "option_checks.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
@@ -31,34 +34,66 @@ struct CheckArguments {
 constexpr double usable = 1;
 constexpr double of_these_cameras = 3;
 
-/// Then the epipolar error tells nothing: where the cameras look the same way, it is as small.
+/// Then the epipolar error tells nothing: where cameras look the same way, it is as small with one
+/// in the other's place.
 bool lie_behind(const ws::EpipolarReport& report) { return report.behind > 0.5; }
 
-bool fits(const ws::View& first, const ws::View& second,
-          const std::vector<ws::PixelMatch>& matches) {
+/// The median epipolar error, of points before the cameras; infinite where they are not.
+double error_before_cameras(const ws::View& first, const ws::View& second,
+                            const std::vector<ws::PixelMatch>& matches) {
+  constexpr double none = std::numeric_limits<double>::infinity();
   try {
     const ws::EpipolarReport report = check_epipolar(first, second, matches);
-    return !lie_behind(report) && report.median_pixels < of_these_cameras;
+    return lie_behind(report) ? none : report.median_pixels;
   } catch (const ws::Error&) {
-    return false;  // too few features left
+    return none;  // too few features left
   }
 }
 
-std::string verdict_behind(const ws::View& first, const ws::View& second,
-                           const std::vector<ws::PixelMatch>& matches) {
+/// What was mistaken for what, where that explains the matches better than anything else.
+std::string mistake(const ws::View& first, const ws::View& second,
+                    const std::vector<ws::PixelMatch>& matches) {
   std::vector<ws::PixelMatch> swapped = matches;
   for (ws::PixelMatch& match : swapped) std::swap(match.first, match.second);
   ws::View first_there = first;
   ws::View second_there = second;
   std::swap(first_there.world_from_camera, second_there.world_from_camera);
-  const bool images_are_swapped = fits(first, second, swapped);
-  const bool poses_are_inverted = fits(first_there, second_there, matches);
-  if (!images_are_swapped && !poses_are_inverted) {
-    return "does not fit: are the images of one moment, and of these cameras?";
+  ws::View opposite = second;
+  opposite.world_from_camera.translation() =
+      2 * first.world_from_camera.translation() - second.world_from_camera.translation();
+  const std::pair<const char*, double> remedies[] = {
+      {"swap the images", error_before_cameras(first, second, swapped)},
+      {"invert the poses", error_before_cameras(first_there, second_there, matches)},
+      {"turn the baseline round (-T)", error_before_cameras(first, opposite, matches)}};
+  double least = of_these_cameras;
+  for (const auto& remedy : remedies) least = std::min(least, remedy.second);
+  std::string words;
+  for (const auto& [words_of_it, error] : remedies) {
+    const double as_good = 1.5 * least;  // where they hardly differ, nobody could tell
+    if (!(error < of_these_cameras) || error > as_good) continue;
+    words += (words.empty() ? "" : ", or ") + std::string(words_of_it);
   }
-  return std::string("wrong way round: ") + (images_are_swapped ? "swap the images" : "") +
-         (images_are_swapped && poses_are_inverted ? ", or " : "") +
-         (poses_are_inverted ? "invert the poses" : "");
+  return words;
+}
+
+std::string verdict_of(const ws::EpipolarReport& report, const ws::View& first,
+                       const ws::View& second, const std::vector<ws::PixelMatch>& matches,
+                       bool has_poses) {
+  if (!lie_behind(report)) {
+    if (report.median_pixels < 0.5) return "good";
+    if (report.median_pixels < usable) return "usable, expect errors where texture is fine";
+    if (report.median_pixels < of_these_cameras) {
+      return has_poses ? "too inaccurate for stereo: calibrate again, or get better poses"
+                       : "too inaccurate for stereo: calibrate again";
+    }
+  }
+  const std::string remedy = mistake(first, second, matches);
+  if (!remedy.empty()) return "wrong way round: " + remedy;
+  return has_poses
+             ? "does not fit: are the poses those of these images, to world, with quaternions "
+               "in their file's order?"
+             : "does not fit: are the images of one moment, and of these cameras? Then calibrate "
+               "again";
 }
 
 std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
@@ -66,8 +101,11 @@ std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
     return ws::formatted("%.0f %% of the features lie behind the cameras", 100 * report.behind);
   }
   if (!(report.nearest > 0)) return "no feature is near enough and matched well enough to tell";
-  return ws::formatted("5 %% below %.2f%s, half below %.2f%s, 95 %% below %.2f%s", report.nearest,
-                       unit, report.typical, unit, report.farthest, unit);
+  const auto text = [unit](double distance) {
+    return ws::formatted(distance < 0.1 ? "%.2g" : "%.2f", distance) + unit;
+  };
+  return "5 % below " + text(report.nearest) + ", half below " + text(report.typical) +
+         ", 95 % below " + text(report.farthest);
 }
 
 void check(const CheckArguments& arguments) {
@@ -81,16 +119,13 @@ void check(const CheckArguments& arguments) {
   const ws::View& second = images.rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);
   ws::require_calibrated_size(right, second, arguments.right);
+  require_different_pictures(images.rig, {left, right});
   const std::vector<ws::PixelMatch> matches = ws::match_features(left, right);
   const ws::EpipolarReport r = check_epipolar(first, second, matches);
   const auto sharpness = ws::compare_sharpness(first, second, left, right, matches);
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
-  const std::string verdict = lie_behind(r)           ? verdict_behind(first, second, matches)
-                              : r.median_pixels < 0.5 ? "good"
-                              : r.median_pixels < usable
-                                  ? "usable, expect errors where texture is fine"
-                                  : "too inaccurate for stereo: calibrate again";
+  const std::string verdict = verdict_of(r, first, second, matches, arguments.poses.given());
   if (arguments.as_json) {
     // 0: there is none
     const auto distance = [](double value) {

@@ -8,6 +8,7 @@
 
 #include "calibration_commands.h"
 #include "calibration_output.h"
+#include "matching_run.h"
 #include "option_checks.h"
 #include "rig_settings.h"
 #include "say.h"
@@ -53,6 +54,7 @@ std::vector<ws::ViewMatches> match_frames(const ws::Rig& rig, const std::vector<
       images.push_back(white_level.read(files[frame + i]));
       ws::require_calibrated_size(images[i], rig.views[i], files[frame + i]);
     }
+    require_different_pictures(rig, images);
     for (ws::ViewMatches& pair : pairs) {
       const auto found = ws::match_features(images[pair.first], images[pair.second]);
       pair.matches.insert(pair.matches.end(), found.begin(), found.end());

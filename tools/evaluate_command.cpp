@@ -3,12 +3,15 @@
 #include <iostream>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <utility>
 
 #include "commands.h"
 #include "map_checks.h"
 #include "option_checks.h"
 #include "result_folder.h"
+#include "say.h"
+#include "text/number.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -23,6 +26,7 @@ struct EvaluateArguments {
   std::string prediction, normals, confidence;
   std::string set;
   std::string truth, valid, occlusion, truth_normals, image, field_of_view, calibration;
+  std::optional<int> view_of_map, source_of_map;  ///< as given
   int view = 0, source = 1;
   double png_scale = FolderFormat::usual_png_scale;
   double far_distance = 0;  ///< metres, 0: do not score what has no ground truth
@@ -44,6 +48,29 @@ cv::Mat read_map(const std::string& file, int values, const std::string& what,
   cv::Mat map = ws::read_map(file, png_scale);
   require_values(map, file, values, what);
   return map;
+}
+
+/// Which view the map is of, as its name says where it is one of ours and the set has such a view;
+/// 0 otherwise.
+int view_in_name(const fs::path& map, const fs::path& set) {
+  const std::string stem = map.stem().string();
+  for (const std::string name : {"distance_accepted", "distance"}) {
+    if (!stem.starts_with(name)) continue;
+    const std::optional<double> view = ws::number_of(stem.substr(name.size()));
+    if (view && fs::exists(set / ("depth" + stem.substr(name.size()) + ".tiff"))) {
+      return static_cast<int>(*view);
+    }
+  }
+  return 0;
+}
+
+void choose_views(EvaluateArguments& a) {
+  a.view = a.view_of_map ? *a.view_of_map : a.set.empty() ? 0 : view_in_name(a.prediction, a.set);
+  a.source = a.source_of_map.value_or(a.view == 0 ? 1 : 0);
+  if (!a.view_of_map && a.view != 0) {
+    say(a.prediction + " is scored as of view " + std::to_string(a.view) +
+        ", by its name; --view chooses another.");
+  }
 }
 
 /// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),
@@ -69,6 +96,7 @@ void take_from_set(EvaluateArguments& a) {
 }
 
 void run_evaluate(EvaluateArguments a) {
+  choose_views(a);
   if (!a.set.empty()) take_from_set(a);
   if (a.truth.empty() || a.calibration.empty()) {
     throw ws::Error("Give --truth and --calibration, or a folder with both by --set.");
@@ -177,9 +205,12 @@ void add_evaluate_command(CLI::App& app) {
                    "Mask, 0 = outside the lens; for --far-distance")
       ->needs(far_distance);
   command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
-  command->add_option("--view", a->view, "Camera of the distance map")->capture_default_str();
-  command->add_option("--source", a->source, "Camera in which displacements are measured")
-      ->capture_default_str();
+  command->add_option(
+      "--view", a->view_of_map,
+      "Camera of the distance map (default 0, or with --set the number in its name)");
+  command->add_option(
+      "--source", a->source_of_map,
+      "Camera in which displacements are measured (default 1, or 0 for another view)");
   command->add_option("--error-map", a->error_map, "Write a picture of the relative error");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_evaluate(*a); });

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "progress_bar.h"
+#include "result_folders.h"
 #include "say.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -70,6 +71,25 @@ bool is_blank(const cv::Mat& image, const cv::Mat& mask) {
   return brightest - darkest <= noise;
 }
 
+std::string same_pictures(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const bool alike = images[i].size() == images[j].size() &&
+                         images[i].type() == images[j].type() &&
+                         cv::norm(images[i], images[j], cv::NORM_INF) == 0;
+      if (!alike || is_blank(images[i], cv::Mat())) continue;
+      return "The images of " + rig.views[j].name + " and " + rig.views[i].name +
+             " are one picture, pixel by pixel; give each its own.";
+    }
+  }
+  return "";
+}
+
+void require_different_pictures(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
+  const std::string same = same_pictures(rig, images);
+  if (!same.empty()) throw ws::Error(same);
+}
+
 void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     const ws::View& view = rig.views[i];
@@ -103,7 +123,9 @@ MatchingRun match_images(const MatchSettings& settings, const ws::Rig& rig,
   run.device = device.info();
   report_few_sources(run.options, rig.views.size());
   ws::Matcher matcher(device, rig, run.options);
+  require_different_pictures(rig, images);
   report_blank_images(rig, images);
+  ResultFolders::require_none(output);
   ws::prepare_output_folder(output);
   run.lock = std::make_shared<const FolderLock>(output);
   {

@@ -37,7 +37,13 @@ void require_no_validation_messages(const widestereo::Device& device);
 
 /// Whether an image shows nothing but noise where the mask, which may be empty, is not 0.
 bool is_blank(const cv::Mat& image, const cv::Mat& mask);
-/// Says, on standard error, which images do: black ones, of a covered lens or a camera that failed.
+/// Which two views have one picture, as a sentence; empty where none have. That of one camera on
+/// both channels, or a copy, matches itself at any distance. Blank ones may be alike.
+std::string same_pictures(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
+/// Throws Error where there are such views.
+void require_different_pictures(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
+/// Says, on standard error, which images are blank: black ones, of a covered lens or a camera that
+/// failed.
 void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
 
 /// Says, on standard error, which views see nothing that another one does.

@@ -228,6 +228,9 @@ class Reconstruction {
       rig.views.push_back(images_.views[image]);
       pixels.push_back(images_.read(image));
     }
+    // Of one among many, as where a frame was recorded twice, which does not end the run.
+    const std::string same = same_pictures(rig, pixels);
+    if (!same.empty()) say(same);
     report_blank_images(rig, pixels);
     MatchingRun run{.options = options_[number], .device = device_.info(), .result = {}};
     ws::Matcher matcher(device_, rig, run.options);

@@ -68,6 +68,16 @@ ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, b
   ws::remove_unfinished_files(folder_);
 }
 
+void ResultFolders::require_none(const fs::path& folder) {
+  const Json record = record_in(folder);
+  const Json input = record.is_object() ? record.value("input", Json()) : Json();
+  const Json run = input.is_object() ? input.value("run", Json()) : Json();
+  for (const std::string kind : {sequence, reconstruction}) {
+    if (!fs::exists(folder / (kind + ".json")) && run != Json(kind)) continue;
+    throw ws::Error(folder.string() + " holds results of a " + kind + "; choose another folder.");
+  }
+}
+
 bool ResultFolders::is_record_of_result(const Json& record) const {
   const auto all = [&record](const std::vector<std::string>& keys, auto&& is_type) {
     return std::all_of(keys.begin(), keys.end(), [&](const std::string& key) {

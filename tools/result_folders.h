@@ -37,6 +37,10 @@ class ResultFolders {
   /// something new to record.
   ResultFolders(std::filesystem::path folder, Kind kind, const Json& settings, bool overwrite);
 
+  /// Throws Error where the folder holds such a run, or one of its results: another result there
+  /// would spoil it.
+  static void require_none(const std::filesystem::path& folder);
+
   const std::filesystem::path& folder() const { return folder_; }
   const Json& record() const { return record_; }
   /// Records of the finished results, in the order in which they were added.

@@ -122,6 +122,7 @@ Selection select_frames(const SequenceArguments& a) {
   selection.rig = selection.calibrated;
   for (ws::View& view : selection.rig.views) view = a.size.reduced(view);
   const std::vector<cv::Mat> first = reduced(images, start, selection.calibrated, a.size);
+  require_different_pictures(selection.rig, first);
   report_blank_images(selection.rig, first);
   // The first frame that shows anything decides alone, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);

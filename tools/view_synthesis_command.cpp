@@ -9,6 +9,7 @@
 #include "pose_settings.h"
 #include "result_folder.h"
 #include "rig_settings.h"
+#include "say.h"
 #include "size_settings.h"
 #include "white_level.h"
 #include "widestereo/error.h"
@@ -60,6 +61,11 @@ void run_synthesis(const SynthesisArguments& a) {
     cv::Mat picture;
     synthesised.image.convertTo(picture, CV_8U);
     ws::write_image(a.picture, picture);
+  }
+  constexpr double hardly_alike = 0.3;
+  if (scores.mean < hardly_alike) {
+    say("The images are hardly alike at these distances; check that " + a.distance + " is of " +
+        a.image + ", and the order of the images.");
   }
   std::cout << (a.as_json ? ws::to_json(scores) + "\n" : ws::to_table(scores));
 }

@@ -75,7 +75,9 @@ void put_text(cv::Mat& picture, const std::string& text, cv::Point at, double sc
 }
 
 std::string metres(double value) {
-  return formatted(value < 1 ? "%.2f" : value < 10 ? "%.1f" : "%.0f", value);
+  // Of a model in its own unit, two digits.
+  const char* form = value < 0.1 ? "%.2g" : value < 1 ? "%.2f" : value < 10 ? "%.1f" : "%.0f";
+  return formatted(form, value);
 }
 
 /// A horizontal bar from share 0 to 1 with labels at given shares.

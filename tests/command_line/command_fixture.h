@@ -103,6 +103,7 @@ class Command : public ::testing::Test {
     cv::randu(noise, 0, 255);
     cv::imwrite(file("left.png"), noise);
     cv::imwrite(file("right.png"), noise);
+    alter("right.png", 60);
   }
 
   /// Writes imucam.yaml: calib.yaml with an IMU at (0.05, -0.04, -0.07) m in the frame of cam0,
@@ -133,10 +134,17 @@ class Command : public ::testing::Test {
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   /// Of a file in the folder, or of any by its whole path.
   std::string bytes_of(const std::string& name) const { return test::bytes_of(folder_ / name); }
-  /// The name of another file with the same content.
+  /// Changes one byte of an image, on its diagonal: no two cameras give the same picture.
+  void alter(const std::string& image, int place) const {
+    cv::Mat pixels = cv::imread(file(image), cv::IMREAD_UNCHANGED);
+    pixels.ptr(place)[place] ^= 64;
+    cv::imwrite(file(image), pixels);
+  }
+  /// The name of another file with the same picture but for a byte.
   std::string copy_of(const std::string& name) const {
     const std::string copy = "copy_of_" + name;
     fs::copy_file(folder_ / name, folder_ / copy, fs::copy_options::overwrite_existing);
+    alter(copy, 4);
     return copy;
   }
   std::string depth_of(const std::string& left, const std::string& right,

@@ -144,7 +144,8 @@ TEST_F(OptionsOfDepth, OutOfRangeAreNamed) {
 TEST_F(Command, SequencesMayHavePictures) {
   for (const char* camera : {"cam0", "cam1"}) {
     fs::create_directories(folder_ / "data" / camera);
-    fs::copy_file(file("left.png"), folder_ / "data" / camera / "0.png");
+    fs::copy_file(file(camera == std::string("cam0") ? "left.png" : "right.png"),
+                  folder_ / "data" / camera / "0.png");
   }
   const std::string sequence =
       "sequence " + file("data") + " -c " + file("calib.yaml") + quick + "-o ";
@@ -171,7 +172,8 @@ TEST_F(Command, BenchmarkTakesSeveralWindowRadii) {
 TEST_F(Command, ReconstructionsJoinPointsAsFarApartAsAskedFor) {
   for (const char* camera : {"cam0", "cam1"}) {
     fs::create_directories(folder_ / "data" / camera);
-    fs::copy_file(file("left.png"), folder_ / "data" / camera / "0.png");
+    fs::copy_file(file(camera == std::string("cam0") ? "left.png" : "right.png"),
+                  folder_ / "data" / camera / "0.png");
   }
   const std::string reconstruct = "reconstruct " + file("data") + " --count 1 --min-views 1 -c " +
                                   file("calib.yaml") + " -o " + file("out") + quick;
@@ -270,6 +272,14 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
                               " --view 1 --source 0 --set " + file("set"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_GT(nlohmann::json::parse(outcome.output)["far"]["pixels"], 1000);
+  // By the name of the map, where the set has such a view.
+  for (const char* name : {"distance1.tiff", "distance_accepted1.tiff", "distance7.tiff"}) {
+    fs::copy_file(file("prediction.tiff"), file(name));
+    const std::string said = run("evaluate " + file(name) + " --set " + file("set")).output;
+    EXPECT_EQ(said.find("is scored as of view 1, by its name") != std::string::npos,
+              std::string(name) != "distance7.tiff")
+        << said;
+  }
 }
 
 }  // namespace

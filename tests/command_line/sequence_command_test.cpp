@@ -224,13 +224,20 @@ TEST_F(SequenceCommand, FoldersOfOthersAreLeftAlone) {
   expect_left_alone();
 }
 
-TEST_F(SequenceCommand, FramesOverwrittenByOthersAreNoneOfItsOwn) {
+TEST_F(SequenceCommand, FramesAreNotOverwrittenByASingleResult) {
   ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
-  ASSERT_EQ(run("depth " + file("data/cam0/001.png") + " " + file("data/cam1/001.png") + " -c " +
-                file("calib.yaml") + quick + " -o " + file("out/000"))
-                .exit_code,
-            0);
-  expect_error(sequence() + "--count 1", "out/000 is there already and is no result of a sequence");
+  const std::string frame = bytes_of("out/000/result.json");
+  const std::string depth = "depth " + file("data/cam0/001.png") + " " + file("data/cam1/001.png") +
+                            " -c " + file("calib.yaml") + quick + " -o ";
+  for (const char* folder : {"out", "out/000"}) {
+    const Outcome outcome = run(depth + file(folder));
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find("holds results of a sequence; choose another folder."),
+              std::string::npos)
+        << outcome.output;
+  }
+  EXPECT_TRUE(bytes_of("out/000/result.json") == frame);
+  EXPECT_FALSE(fs::exists(folder_ / "out/result.json"));
 }
 
 TEST_F(SequenceCommand, AFullDiskLeavesNothingUnfinished) {
@@ -347,6 +354,9 @@ TEST_F(SequenceCommand, ASceneCutIsNoticedWhereARunWasResumed) {
 TEST_F(SequenceCommand, ViewsWithoutPlanesHaveNoPartInTheMeanCost) {
   write_calibration_looking_backwards();
   fs::copy(folder_ / "data/cam0", folder_ / "data/cam2");
+  for (const char* frame : {"000", "001", "002"}) {
+    alter("data/cam2/" + std::string(frame) + ".png", 5);
+  }
   const std::string sequence = "sequence " + file("data") + " -c " + file("backwards.yaml") +
                                " -o " + file("out") + " --views 0,1,2 --count ";
   for (const char* count : {"1", "2"}) {
@@ -711,6 +721,7 @@ TEST_F(SequenceCommand, AllCamerasOfOneFrameAreMatchedWithEachOther) {
     calibration += camera + last.substr(4);
     fs::create_directories(folder_ / "data" / camera);
     fs::copy_file(folder_ / "data/cam0/000.png", folder_ / "data" / camera / "000.png");
+    alter("data/" + std::string(camera) + "/000.png", camera == std::string("cam2") ? 5 : 6);
   }
   folder_.write("four.yaml", calibration);
   const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("four.yaml") +
