@@ -166,7 +166,7 @@ FN void search_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     vec4 better = better_of(CONTEXT pixel, ray, held,
                             adaptive_candidate(CONTEXT pixel, ray, m, speed, source, kind),
                             1.0f / max(speed, 1e-6f));
-    if (!of_other_surface || better.w <= OTHER_SURFACE_SHARE * held.w) held = better;
+    if (better.w <= (of_other_surface ? OTHER_SURFACE_SHARE : PASS.tolerance) * held.w) held = better;
   }
   store_hypothesis(CONTEXT REFERENCE, pixel, held);
 }

@@ -87,10 +87,12 @@ FN int samples_of_patch(int radius, int pattern) {
 #define CANDIDATE_SOURCE_PLANE 13
 #define CANDIDATE_OTHER_SURFACE 14
 
-// Bits of PassParameters.candidates of other kernels: see regress_plane(), adopt_pixel(),
-// and adopt_fill_pixel(), where it stands beside the reasons.
+// Bits of PassParameters.candidates of other kernels: see regress_plane(), adopt_pixel(), filtered_plane(),
+// subpixel_pixel(), and adopt_fill_pixel(), where it stands beside the reasons.
 #define REGRESS_NORMALS 1u
 #define HELD_UNSEEN 2u
+#define FILTER_MOVED 4u
+#define WHOLE_SHIFT 8u
 #define FILL_WITH_MATCHES (2u * REASON_LOW_CONFIDENCE)
 
 // Of the plane regression: the rounds for distances, of which one, from 0 on, first asks a whole neighbourhood, each
@@ -137,15 +139,17 @@ struct PassParameters {
   uint seed;
   int first_row;   // rows of this dispatch: the back end may split a dispatch into bands
   int last_row;    // one past the last, which a view that is lower than others does not reach
-  uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS; adopting:
-                    // HELD_UNSEEN; filling: reasons not to fill, FILL_WITH_MATCHES
+  uint candidates;  // adaptive search: bit k: candidate kind k is tried; regression: REGRESS_NORMALS,
+                    // FILTER_MOVED; adopting: HELD_UNSEEN; sub-pixel match: WHOLE_SHIFT; filling: reasons not to
+                    // fill, FILL_WITH_MATCHES
   float step_pixels;  // adaptive search: largest displacement of a perturbation in the source
   float step_normal;  // adaptive search: largest change of a unit normal's coordinates
   int radius;         // regression, vote, filling: pixels
   int steps;          // sweep: inverse distances; regression: of its grid of neighbours, in the radius
   float deviation;    // regression: standard deviation (source pixels) that is enough; 0: normals only
   int places;         // ambiguity: other places tried for a better match; upsample: coarser pixels whose planes are tried
-  float tolerance;    // regression: squared scale of its robust weights, as a share of the first round's
+  float tolerance;    // regression: squared scale of its robust weights, as a share of the first round's; adaptive
+                      // search: the most that a better plane may cost, as a share of the held one's cost
 };
 
 // Push constants after those, where an application's image is read or map is written (Vulkan).

@@ -13,6 +13,10 @@
 #define LEAST_AGREEMENT 0.4f
 #define SMALLEST_SQUARED_MOVE_OF_MIXED 0.01f
 #define LARGEST_SQUARED_MOVE_OF_MIXED 9.0f
+// The share of a frame that started from the planes of the one before, at least; and the squared move (px^2) of the plane
+// for which half of the rest counts, too: smaller ones are noise, mostly, larger ones mend errors.
+#define LEAST_SHARE_OF_FRAME 0.1f
+#define SQUARED_MOVE_OF_NOISE 0.0225f
 
 FN bool mixes_surfaces(CONTEXT_ARGUMENT PlaneFit fit) {
   return planes_are_regressed(CONTEXT_ONLY) && fit.agreement < LEAST_AGREEMENT;
@@ -75,8 +79,22 @@ FN bool regress_slopes(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 s
   return found;
 }
 
-// Stores the regressed plane (m, 1) as the pixel's prior, zero where there is none. Without PASS.deviation the
-// pixel keeps its distance and gets a normal alone.
+// Between the plane that the pixel held and the regressed one, the nearer to this the farther they are apart: an average over
+// the frames of a sequence.
+FN LocalPlane filtered_plane(LocalPlane held, LocalPlane regressed, float speed) {
+  float move = speed * (regressed.offset - held.offset);
+  float squared_move = move * move;
+  float share = LEAST_SHARE_OF_FRAME +
+                (1.0f - LEAST_SHARE_OF_FRAME) * (squared_move / (squared_move + SQUARED_MOVE_OF_NOISE));
+  LocalPlane plane;
+  plane.offset = held.offset + share * (regressed.offset - held.offset);
+  plane.slope_x = held.slope_x + share * (regressed.slope_x - held.slope_x);
+  plane.slope_y = held.slope_y + share * (regressed.slope_y - held.slope_y);
+  return plane;
+}
+
+// Stores the regressed plane (m, 1) as the pixel's prior, with FILTER_MOVED the filtered one, zero where there is none.
+// Without PASS.deviation the pixel keeps its distance and gets a normal alone.
 FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
@@ -92,9 +110,11 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     plane.offset = dot(m, ray);
     plane.slope_x = dot(m, east) / (TANGENT_SCALE * TANGENT_SCALE);
     plane.slope_y = dot(m, south) / (TANGENT_SCALE * TANGENT_SCALE);
+    LocalPlane moved = plane;
     vec4 own = check_at(CONTEXT REFERENCE, pixel);
     bool found = PASS.deviation > 0.0f ? regress_plane(CONTEXT pixel, ray, east, south, own, plane)
                                          : regress_slopes(CONTEXT pixel, ray, east, south, own, plane);
+    if ((PASS.candidates & FILTER_MOVED) != 0u) plane = filtered_plane(moved, plane, own.y);
     vec3 regressed = plane.offset * ray + plane.slope_x * east + plane.slope_y * south;
     if (found && admissible(CONTEXT ray, regressed)) prior = vec4(regressed, 1.0f);
   }

@@ -76,8 +76,10 @@ FN void subpixel_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec2 velocity;
   int source = agreeing_source(CONTEXT pixel, vec3(ray.x, ray.y, ray.z), m, velocity);
   vec2 direction = reference_direction(CONTEXT source, pixel, m, (1.0f / measure.y) * velocity);
-  // What a precise patch still asks for is less its noise than a second surface in it.
-  float share = measure.x / (measure.x + HALF_SHIFT_VARIANCE);
+  // What a precise patch still asks for is less its noise than a second surface in it. Where frames are averaged, each tells
+  // all that it can by itself.
+  bool whole = (PASS.candidates & WHOLE_SHIFT) != 0u;
+  float share = whole ? 1.0f : measure.x / (measure.x + HALF_SHIFT_VARIANCE);
   measure.z -= share * subpixel_shift(CONTEXT source, pixel, m, direction) / measure.y;
   store_check(CONTEXT REFERENCE, pixel, measure);
 }

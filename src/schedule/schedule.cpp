@@ -360,19 +360,27 @@ class Builder {
   /// Little more than what corrects planes that are nearly right: the near strips, half of them for
   /// each colour, carry surfaces into what has come into view; perturbations of distance follow
   /// what moved, and random distances find what has come near, for one colour, from which the other
-  /// one takes them; the regression then averages, and finds the normals.
+  /// one takes them. What patches match best is then averaged over neighbours, and with the planes
+  /// that moved, and so over frames.
   void search_warm() {
+    // Planes that match a little better would put noise in the place of an average.
+    constexpr double better_than_moved = 0.8;
     for (int i = 0; i < options_.warm_iterations; ++i) {
-      search(0, i, {near_strips[0] | inverse_distance | random_distance, near_strips[1]});
+      search(0, i, {near_strips[0] | inverse_distance | random_distance, near_strips[1]},
+             better_than_moved);
     }
     if (options_.warm_regressions == 0) return;
     // Measured once for all rounds, so that planes need their costs after the last one only.
     measure(views_of(0));
+    const bool filters = options_.subpixel_match;
+    if (filters) match_subpixel(views_of(0), WHOLE_SHIFT);
     for (int i = 0; i < options_.warm_regressions; ++i) {
       const bool last = i + 1 == options_.warm_regressions;
-      const unsigned how = (last ? REGRESS_NORMALS : 0) | (i > 0 ? HELD_UNSEEN : 0);
-      regress(views_of(0), round(i), how, last ? until_vote() : Kernel::adopt_point,
-              warm_regression_steps());
+      const unsigned how =
+          (last ? REGRESS_NORMALS : 0) | (i > 0 ? HELD_UNSEEN : 0) | (filters ? FILTER_MOVED : 0);
+      // The frame before had the first round.
+      regress(views_of(0), round(filters ? i + 1 : i), how,
+              last ? until_vote() : Kernel::adopt_point, warm_regression_steps());
     }
     repair_and_vote();
   }
@@ -432,21 +440,29 @@ class Builder {
     return candidates;
   }
 
-  /// `candidates`: of each colour.
-  void search(int level, int iteration, const std::array<unsigned, 2>& candidates) {
+  /// As a share of the held plane's cost, what no better one costs: far planes may cost a little
+  /// more.
+  static constexpr double any_better = 2;
+
+  /// `candidates`: of each colour. `most_cost`: of a plane that is taken, as a share of the held
+  /// one's.
+  void search(int level, int iteration, const std::array<unsigned, 2>& candidates,
+              double most_cost = any_better) {
     // A view's planes may be candidates of the next one's.
     const bool reads_views = ((candidates[0] | candidates[1]) & source_planes) != 0;
     for (const Views views : launches(level, reads_views ? one_by_one : at_once)) {
-      search(views, iteration, candidates);
+      search(views, iteration, candidates, most_cost);
     }
   }
 
-  void search(Views views, int iteration, const std::array<unsigned, 2>& candidates) {
+  void search(Views views, int iteration, const std::array<unsigned, 2>& candidates,
+              double most_cost) {
     kernel::PassParameters pass = pass_of(views);
     pass.iteration = iteration + 1;
     const double share = std::pow(0.5, iteration);
     pass.step_pixels = static_cast<float>(options_.step_pixels * share);
     pass.step_normal = static_cast<float>(options_.step_normal * share);
+    pass.tolerance = static_cast<float>(most_cost);
     for (int colour = 0; colour < 2; ++colour) {
       pass.colour = colour;
       pass.candidates = candidates[static_cast<std::size_t>(colour)];
@@ -475,8 +491,12 @@ class Builder {
 
   void measure(Views views) { add(Kernel::measure, pass_of(views), views, 0); }
 
-  /// In the source that tells most.
-  void match_subpixel(Views views) { add_with_patches(Kernel::subpixel, pass_of(views), views, 1); }
+  /// In the source that tells most. `how`: see shaders/subpixel.glsl.
+  void match_subpixel(Views views, unsigned how = 0) {
+    kernel::PassParameters pass = pass_of(views);
+    pass.candidates = how;
+    add_with_patches(Kernel::subpixel, pass, views, 1);
+  }
 
   /// Planes that were regressed in the frame before need fewer neighbours.
   int warm_regression_steps() const {

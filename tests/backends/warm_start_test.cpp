@@ -209,6 +209,33 @@ TEST_P(WarmStarts, NeedAMatchThatWasNotAborted) {
   expect_no_validation_messages(*device);
 }
 
+/// Of a scene at rest, whose images have noise of their own.
+TEST_P(WarmStarts, AverageOverFrames) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  Matcher matcher(*device, frame(0).rig, options_of("fast"));
+  cv::RNG noise(7);
+  const auto noisy = [&] {
+    std::vector<cv::Mat> images = images_of(frame(0));
+    for (cv::Mat& image : images) {
+      cv::Mat more(image.size(), CV_MAKETYPE(CV_16S, image.channels()));
+      noise.fill(more, cv::RNG::NORMAL, 0, 5);
+      image.convertTo(image, CV_16S);
+      image += more;
+      image.convertTo(image, CV_8U);
+    }
+    return images;
+  };
+  const double alone = scores_of(matcher.match(noisy()), frame(0)).median_pixels;
+  double last = 0;
+  for (int k = 1; k < 7; ++k) {
+    last = scores_of(matcher.match_next(
+                         noisy(), {.now_from_previous = Eigen::Isometry3d::Identity(), .frame = k}),
+                     frame(0))
+               .median_pixels;
+  }
+  EXPECT_LT(last, 0.85 * alone);
+}
+
 INSTANTIATE_TEST_SUITE_P(Devices, WarmStarts, ::testing::Values("cpu", "vulkan", "cuda"),
                          [](const auto& test) { return std::string(test.param); });
 

@@ -339,5 +339,23 @@ TEST_F(Regression, OfNormalsAloneStopsAtTheEndOfASmallSurface) {
   EXPECT_LT(error, 5);
 }
 
+/// Of a plane that moved here from the frame before, what is noise counts little and what is an
+/// error all but whole.
+TEST_F(Regression, FiltersSmallMoves) {
+  const ivec2 pixel(48, 48);
+  const Eigen::Vector3d r = ray(pixel);
+  measure([](int) { return wall; }, 0.01, 0);
+  for (const auto& [pixels, share] :
+       {std::pair(0.03, 0.13), std::pair(0.15, 0.55), std::pair(1.0, 0.98)}) {
+    const Eigen::Vector3d held = wall + pixels / speed * r;
+    cv::Vec4f& hypothesis = fixture_.view(0).hypotheses(pixel.y, pixel.x);
+    for (int i = 0; i < 3; ++i) hypothesis[i] = static_cast<float>(held[i]);
+    const double whole = (regressed(pixel, 18, 0.015) - held).dot(r);
+    const double filtered = (regressed(pixel, 18, 0.015, 4, FILTER_MOVED) - held).dot(r);
+    EXPECT_NEAR(-whole * speed, pixels, 0.01);
+    EXPECT_NEAR(filtered / whole, share, 0.03);
+  }
+}
+
 }  // namespace
 }  // namespace widestereo::test

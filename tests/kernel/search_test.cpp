@@ -165,7 +165,7 @@ TEST_F(Candidates, AreDrawnFromAroundWhatIsHeldToEitherSide) {
 }
 
 /// Costs of the planes that pixels before a wall take from such candidates; all held another one.
-std::vector<float> taken_costs(int kind, float held_cost) {
+std::vector<float> taken_costs(int kind, float held_cost, float most_cost = 2) {
   const Rig rig = fisheye_rig(size);
   synthesis::Scene scene;
   const synthesis::Paint paint{
@@ -175,6 +175,7 @@ std::vector<float> taken_costs(int kind, float held_cost) {
   fixture.show(render(scene, rig, 4));
   fixture.set_reference(0);
   fixture.pass().candidates = 1u << kind;
+  fixture.pass().tolerance = most_cost;
   std::vector<float> costs;
   for (int y = 30; y < 66; ++y) {
     for (int x = 30; x < 66; ++x) {
@@ -198,6 +199,10 @@ TEST(OtherSurfaces, ReplaceWhatHardlyMatchesByWhatMatchesMuchBetter) {
     EXPECT_GT(std::ranges::max(better), 0.4f * held);
   }
   EXPECT_EQ(taken_costs(CANDIDATE_OTHER_SURFACE, 0.24f), std::vector<float>());
+  // As of planes that moved, in a sequence.
+  for (const float cost : taken_costs(CANDIDATE_RANDOM_DISTANCE, 0.6f, 0.8f)) {
+    EXPECT_LE(cost, 0.8f * 0.6f);
+  }
   EXPECT_NE(taken_costs(CANDIDATE_RANDOM_DISTANCE, 0.24f), std::vector<float>());
 }
 
