@@ -88,8 +88,10 @@ FN LocalPlane filtered_plane(LocalPlane held, LocalPlane regressed, float speed)
                 (1.0f - LEAST_SHARE_OF_FRAME) * (squared_move / (squared_move + SQUARED_MOVE_OF_NOISE));
   LocalPlane plane;
   plane.offset = held.offset + share * (regressed.offset - held.offset);
-  plane.slope_x = held.slope_x + share * (regressed.slope_x - held.slope_x);
-  plane.slope_y = held.slope_y + share * (regressed.slope_y - held.slope_y);
+  // A frame tells less of slopes, so that what is noise in distance is noise in them all the more.
+  float share_of_slopes = share * share * share;
+  plane.slope_x = held.slope_x + share_of_slopes * (regressed.slope_x - held.slope_x);
+  plane.slope_y = held.slope_y + share_of_slopes * (regressed.slope_y - held.slope_y);
   return plane;
 }
 

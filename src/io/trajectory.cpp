@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -10,6 +9,7 @@
 
 #include "geometry/validation.h"
 #include "io/frame_times.h"
+#include "text/lower_case.h"
 #include "text/number.h"
 #include "text/text_input.h"
 #include "widestereo/error.h"
@@ -51,9 +51,9 @@ std::string last_letters(const std::vector<std::string>& names) {
   std::string letters;
   for (const std::string& name : names) {
     const std::string word = trimmed(name.substr(0, name.find('[')));
-    letters += word.empty() ? ' ' : static_cast<char>(std::tolower(word.back()));
+    letters += word.empty() ? ' ' : word.back();
   }
-  return letters;
+  return lower_case(letters);
 }
 
 /// Throws Error where a comment names the quaternion's w in another place than it is looked for.
