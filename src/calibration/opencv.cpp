@@ -372,8 +372,8 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     const Storage storage(document);
     if (storage.matrix(first_matrix).empty()) {
       document.fail(
-          "It has no camera matrix (K1 or M1, K or camera_matrix); one file must hold those of both "
-          "cameras, their distortions, R and T.");
+          "It has no camera matrix (K1 or M1, K or camera_matrix); one file must hold both, their "
+          "distortions, R and T.");
     }
     const cv::Size in_file = storage.image_size();
     const cv::Size size = in_file.empty() ? image_size : in_file;
