@@ -75,6 +75,14 @@ void require_other_file(const std::filesystem::path& output,
   }
 }
 
+void require_other_folder(const std::filesystem::path& output, const std::filesystem::path& data) {
+  std::error_code missing;
+  if (!std::filesystem::equivalent(output, data, missing)) return;
+  throw ws::Error(output.string() +
+                  " is the folder of the images; choose another one, or one within it, for the "
+                  "results.");
+}
+
 void require_different_images(const std::vector<std::filesystem::path>& images) {
   for (auto image = images.begin(); image != images.end(); ++image) {
     for (auto other = images.begin(); other != image; ++other) {

@@ -35,6 +35,9 @@ CLI::Validator name_among(const std::vector<std::pair<std::string, Value>>& name
 void require_other_file(const std::filesystem::path& output,
                         const std::vector<std::filesystem::path>& inputs);
 
+/// Throws Error where the folder for results is that of the data.
+void require_other_folder(const std::filesystem::path& output, const std::filesystem::path& data);
+
 /// Throws Error where an image is given twice: it would match itself at any distance.
 void require_different_images(const std::vector<std::filesystem::path>& images);
 

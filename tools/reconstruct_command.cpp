@@ -345,6 +345,7 @@ class Reconstruction {
 };
 
 void run_reconstruct(const ReconstructArguments& arguments) {
+  require_other_folder(arguments.output, arguments.images.images);
   Reconstruction reconstruction(arguments);
   reconstruction.run();
   const Json& record = reconstruction.folders().record();

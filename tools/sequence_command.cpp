@@ -386,6 +386,7 @@ void summarise(const Json& frames, bool warm) {
 }
 
 void run_sequence(const SequenceArguments& arguments) {
+  require_other_folder(arguments.output, arguments.dataset);
   const ws::Options options = arguments.settings.options();
   arguments.format.require_room_for(options.min_distance, options.max_distance);
   SequenceRun run(arguments, select_frames(arguments));

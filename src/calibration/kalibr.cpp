@@ -142,7 +142,10 @@ KalibrForm kalibr_form(const View& view, const std::filesystem::path& path) {
   const std::optional<KalibrForm> form = form_of(c);
   if (!form || has_skew_or_k3(c)) {
     throw Error("Cannot write " + path.string() + ": " +
-                no_form(view, CalibrationFormat::kalibr, form ? "a skew or a k3" : ""));
+                no_form(view, CalibrationFormat::kalibr,
+                        !form         ? ""
+                        : c.skew != 0 ? "a skew"
+                                      : "a k3"));
   }
   return *form;
 }

@@ -932,7 +932,7 @@ TEST(Writing, NamesTheOtherFormatWhereThatHoldsTheCamera) {
   expect(CameraModel::mei, 0, "",
          "(mei) has no form in Basalt's format; choose Kalibr's or OpenCV's.");
   expect(CameraModel::kannala_brandt, 0.1,
-         "with a skew or a k3) has no form in Kalibr's format; choose OpenCV's.",
+         "with a skew) has no form in Kalibr's format; choose OpenCV's.",
          "with skew) has no form in Basalt's format; choose OpenCV's.");
   expect(CameraModel::double_sphere, 0.1,
          "in Kalibr's format; no other that is written has one, so keep the file that it is from.",

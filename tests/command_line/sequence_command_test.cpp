@@ -246,6 +246,18 @@ TEST_F(SequenceCommand, AFullDiskLeavesNothingUnfinished) {
   EXPECT_FALSE(fs::exists(folder_ / "out/.unfinished"));
 }
 
+TEST_F(SequenceCommand, TheFolderOfTheImagesIsNoneForResults) {
+  for (const char* command : {"sequence ", "reconstruct "}) {
+    const Outcome outcome = run(command + file("data") + " -c " + file("calib.yaml") + " -o " +
+                                file("data/../data/") + quick);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find("is the folder of the images; choose another one"),
+              std::string::npos)
+        << outcome.output;
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "data/000"));
+}
+
 TEST_F(SequenceCommand, AFolderHoldsOneKindOfRun) {
   ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
   const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +
