@@ -42,6 +42,12 @@ bool is_within_folder(const fs::path& name) {
          });
 }
 
+/// What kind of run a record says that its result is of; null if none.
+Json run_of(const Json& record) {
+  const Json whose = record.is_object() ? record.value("input", Json()) : Json();
+  return whose.is_object() ? whose.value("run", Json()) : Json();
+}
+
 }  // namespace
 
 std::string absolute_path(const std::string& path) {
@@ -69,9 +75,7 @@ ResultFolders::ResultFolders(fs::path folder, Kind kind, const Json& settings, b
 }
 
 void ResultFolders::require_none(const fs::path& folder) {
-  const Json record = record_in(folder);
-  const Json input = record.is_object() ? record.value("input", Json()) : Json();
-  const Json run = input.is_object() ? input.value("run", Json()) : Json();
+  const Json run = run_of(record_in(folder));
   for (const std::string kind : {sequence, reconstruction}) {
     if (!fs::exists(folder / (kind + ".json")) && run != Json(kind)) continue;
     throw ws::Error(folder.string() + " holds results of a " + kind + "; choose another folder.");
@@ -131,8 +135,7 @@ void ResultFolders::keep(const Json& kept) {
 }
 
 bool ResultFolders::is_of_this_kind(const Json& record) const {
-  const Json whose = record.is_object() ? record.value("input", Json()) : Json();
-  return whose.is_object() && whose.value("run", Json()) == Json(kind_.name);
+  return run_of(record) == Json(kind_.name);
 }
 
 bool ResultFolders::is_there(const Json& result) const {

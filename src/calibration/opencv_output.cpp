@@ -65,11 +65,18 @@ void require_form(const Rig& rig, const std::vector<OpenCvForm>& forms,
          "OpenCV's calibrations cannot say where the IMU is; choose Kalibr's or Basalt's "
          "format, or leave the IMU out of what is read.");
   }
+  const Camera& first = rig.views.front().camera;
+  const Camera& last = rig.views.back().camera;
+  if (first.width != last.width || first.height != last.height) {
+    fail(path,
+         "OpenCV calibrates cameras of one image size with each other; choose Kalibr's or "
+         "Basalt's format.");
+  }
   if (forms.front().xi.has_value() != forms.back().xi.has_value()) {
     fail(path, "OpenCV calibrates cameras of one kind with each other, but " +
-                   rig.views.front().name + " is " + to_string(rig.views.front().camera.model) +
-                   " and " + rig.views.back().name + " is " +
-                   to_string(rig.views.back().camera.model) + "; choose Kalibr's format.");
+                   rig.views.front().name + " is " + to_string(first.model) + " and " +
+                   rig.views.back().name + " is " + to_string(last.model) +
+                   "; choose Kalibr's format.");
   }
 }
 
@@ -101,12 +108,6 @@ std::string opencv_text(const std::filesystem::path& path, const Rig& rig) {
   require_form(rig, forms, path);
   cv::FileStorage file("", cv::FileStorage::WRITE | cv::FileStorage::MEMORY | language_of(path));
   const Camera& first = rig.views.front().camera;
-  const Camera& last = rig.views.back().camera;
-  if (first.width != last.width || first.height != last.height) {
-    fail(path,
-         "OpenCV calibrates cameras of one image size with each other; choose Kalibr's or "
-         "Basalt's format.");
-  }
   file << "image_width" << first.width << "image_height" << first.height;
   const bool is_pair = rig.views.size() == 2;
   for (std::size_t i = 0; i < forms.size(); ++i) {

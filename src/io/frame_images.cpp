@@ -145,15 +145,14 @@ std::optional<std::int64_t> time_of(const CameraImages& images, const std::strin
   return images.listed ? whole_number(key) : time_in_name(key);
 }
 
-bool match_by_numbers(std::vector<CameraImages>& cameras) {
+void match_by_numbers(std::vector<CameraImages>& cameras) {
   std::vector<CameraImages> renamed;
   for (const CameraImages& images : cameras) {
-    if (images.listed) return false;
+    if (images.listed) return;
     renamed.push_back(by_numbers(images));
-    if (renamed.back().of_frames.empty()) return false;
+    if (renamed.back().of_frames.empty()) return;
   }
   cameras = std::move(renamed);
-  return true;
 }
 
 void match_by_times(std::vector<CameraImages>& cameras, double tolerance) {

@@ -29,8 +29,8 @@ struct CameraImages {
 std::optional<std::int64_t> time_of(const CameraImages& images, const std::string& key);
 
 /// Gives images the numbers in their names as keys, those that differ within their folder, as
-/// left_07 and right_07 have. False, and nothing changed, where a folder has other names or a list.
-bool match_by_numbers(std::vector<CameraImages>& cameras);
+/// left_07 and right_07 have. Changes nothing where a folder has other names or a list.
+void match_by_numbers(std::vector<CameraImages>& cameras);
 
 /// Gives images the key of the first camera's image that is nearest in time, up to `tolerance`
 /// (seconds); each to one.
