@@ -117,5 +117,18 @@ TEST(Bands, OfTheMostWorkAddUp) {
   }
 }
 
+TEST(Bands, HoldWholeWorkgroups) {
+  const Schedule schedule = make_schedule(fisheye_rig(96), wide_range("fast"));
+  constexpr int rows_of_workgroup = 16;
+  int cut = 0;
+  for (const Band& band : split_into_bands(schedule, 3'000'000)) {
+    const int rows = band.last_row - band.first_row;
+    if (band.last_row == band.dispatch->height || rows < rows_of_workgroup) continue;
+    ++cut;
+    EXPECT_EQ(rows % rows_of_workgroup, 0);
+  }
+  EXPECT_GT(cut, 0);
+}
+
 }  // namespace
 }  // namespace widestereo::test

@@ -260,6 +260,19 @@ TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {
   EXPECT_LT(alone, views.fixture.view(0).checks(48, 48)[2]) << "confidence falls with support";
 }
 
+TEST(Checks, SpecklesHaveLessSupportThanTheOptionAsksFor) {
+  Options options = wide_range();
+  const auto is_speckle = [&](double min_support) {
+    options.min_support = min_support;
+    AgreeingViews views(options);
+    // Half of the planes around: those of the other columns are farther or nearer.
+    views.fixture.view(0).hypotheses.colRange(49, 96) *= 3;
+    return (views.reasons({48, 48}) & REASON_SPECKLE) != 0;
+  };
+  EXPECT_FALSE(is_speckle(0.4));
+  EXPECT_TRUE(is_speckle(0.6));
+}
+
 TEST(Checks, AgreementWithoutEvidenceIsNotConfident) {
   AgreeingViews views(wide_range());
   KernelFixture& fixture = views.fixture;
@@ -661,6 +674,91 @@ TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
   EXPECT_TRUE(is_filled(FILL_WITH_MATCHES, 1.9f, 0.5f)) << "as bad a match as any";
   EXPECT_TRUE(is_filled(FILL_WITH_MATCHES, 0.3f, beyond)) << "perhaps occluded";
   EXPECT_TRUE(is_filled(0, 0.3f, 0.5f)) << "rejected for good";
+}
+
+TEST(Fill, ReachesTheRightPixelsOfImagesThatAreNotSquare) {
+  KernelFixture fixture(fisheye_rig(cv::Size(96, 72)), wide_range());
+  fixture.set_reference(0);
+  fixture.view(0).image().setTo(0.5);
+  fixture.view(0).checks.setTo(cv::Scalar(0, 0, 0, REASON_HIGH_COST));
+  fixture.view(0).checks(36, 45) = cv::Vec4f(0, 0, 0.9f, 0);
+  fixture.view(0).hypotheses(36, 45) = cv::Vec4f(0.05f, 0.1f, 0.5f, 0.1f);
+  fixture.pass().radius = 10;
+  fixture.pass().candidates = REASON_NO_RAY;
+  kernel::cpu::fill_pixel(fixture.context(), {48, 36});
+  EXPECT_EQ(fixture.view(0).priors(36, 48)[2], 0.5f);
+}
+
+TEST(Fill, WithMatchesMayMatchALittleWorse) {
+  const vec3 offered(0.05f, 0.1f, 0.5f);
+  KernelFixture fixture(fisheye_rig(96), wide_range());
+  fixture.set_reference(0);
+  fixture.pass().candidates = FILL_WITH_MATCHES;
+  const float cost =
+      std::min(kernel::cpu::patch_cost(fixture.context(), {48, 48}, offered), NO_INFORMATION_COST);
+  for (const auto& [better, is_filled] : {std::pair(0.08f, true), {0.12f, false}}) {
+    fixture.view(0).hypotheses(48, 48) =
+        cv::Vec4f(2 * offered.x, 2 * offered.y, 2 * offered.z, cost - better);
+    fixture.view(0).priors(48, 48) = cv::Vec4f(offered.x, offered.y, offered.z, 1);
+    fixture.view(0).checks(48, 48) = cv::Vec4f(0.1f, 0.5f, 0.5f, REASON_INCONSISTENT);
+    kernel::cpu::adopt_fill_pixel(fixture.context(), {48, 48});
+    EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[2] == offered.z, is_filled) << better;
+  }
+}
+
+TEST(Checks, ASourceThatTellsLittleCountsWhereNoOtherHasAPlane) {
+  const vec3 wall(0.05f, 0.1f, 0.5f);
+  for (const std::vector<double>& baselines : {std::vector<double>{0.01, 1}, {1, 0.01}}) {
+    KernelFixture fixture(rig_of_baselines(96, baselines), wide_range());
+    fixture.set_reference(0);
+    fixture.hold_in_all_views(wall);
+    fixture.view(baselines[0] == 1 ? 1 : 2).hypotheses.setTo(cv::Scalar(0, 0, 0, INVALID_COST));
+    const kernel::vec2 difference = kernel::cpu::difference_from_nearest(
+        fixture.context(), {48, 48}, to_kernel(fixture.view(0).rays(48, 48)), wall);
+    EXPECT_LT(difference.y, 0.01f);
+  }
+}
+
+TEST(Checks, PixelsWithoutPlanesAreNoSurroundings) {
+  const vec3 wall(0.05f, 0.1f, 0.5f);
+  KernelFixture fixture(fisheye_rig(96), wide_range());
+  fixture.set_reference(0);
+  fixture.hold_in_all_views(wall);
+  fixture.view(0).hypotheses.colRange(50, 96).setTo(cv::Scalar(0, 0, 0, INVALID_COST));
+  const vec3 ray = to_kernel(fixture.view(0).rays(48, 48));
+  const kernel::vec2 support =
+      kernel::cpu::support_of_surroundings(fixture.context(), {48, 48}, ray, dot(wall, ray), 3);
+  EXPECT_FLOAT_EQ(support.x, 1);
+  EXPECT_NEAR(support.y, 0.81f, 1e-4);  // of cost 0.1
+}
+
+TEST(Checks, DirectionsTurnInTheSourceAsTheirDerivativesSay) {
+  const Rig rig = fisheye_rig(96);
+  KernelFixture fixture(rig, wide_range());
+  fixture.set_reference(0);
+  const Eigen::Isometry3d motion = source_from_reference(rig.views[1], rig.views[0]);
+  for (const ivec2 pixel : {ivec2(48, 48), ivec2(70, 48), ivec2(28, 66), ivec2(85, 45)}) {
+    constexpr double w = 0.5, step = 1e-4;
+    const Eigen::Vector3d ray = fixture.ray(0, pixel);
+    const auto direction = [&](double at) { return (motion * (ray / at)).normalized(); };
+    const double truth = direction(w - step).cross(direction(w + step)).norm() / (2 * step);
+    const float turn =
+        kernel::cpu::turn_in_source(fixture.context(), 1, to_kernel(ray), static_cast<float>(w));
+    EXPECT_NEAR(static_cast<double>(turn), truth, 0.02 * truth) << pixel.x;
+  }
+}
+
+TEST(Checks, PixelsOfPanoramasAreNarrow) {
+  Rig rig = fisheye_rig(96);
+  for (View& view : rig.views) view.camera = whole_sphere(144, 72);
+  KernelFixture fixture(rig, wide_range());
+  fixture.set_reference(0);
+  for (const int y : {12, 36, 60}) {
+    const double latitude = (0.5 - (y + 0.5) / 72) * CV_PI;
+    const float squeeze =
+        kernel::cpu::squeeze_of(fixture.context(), {40, y}, to_kernel(fixture.view(0).rays(y, 40)));
+    EXPECT_NEAR(static_cast<double>(squeeze), std::pow(std::cos(latitude), 2), 0.01) << y;
+  }
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <string>
 #include <vector>
 
 #include "cpu/kernels.h"
@@ -18,6 +19,7 @@ namespace widestereo::test {
 inline Eigen::Vector3d to_eigen(const kernel::vec3& v) {
   return Eigen::Vector3f(v.x, v.y, v.z).cast<double>();
 }
+inline kernel::vec3 to_kernel(const cv::Vec4f& v) { return {v[0], v[1], v[2]}; }
 inline kernel::vec3 to_kernel(const Eigen::Vector3d& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
@@ -47,6 +49,30 @@ inline Rig fisheye_rig(int size, double max_theta = 1.7) {
   rig.views[1].world_from_camera =
       Eigen::Translation3d(0.1, 0.004, -0.01) *
       Eigen::AngleAxisd(0.05, Eigen::Vector3d(1, 0.3, -0.2).normalized());
+  return rig;
+}
+
+/// The same with images that are wider, or narrower, than high.
+inline Rig fisheye_rig(cv::Size size) {
+  Rig rig = fisheye_rig(size.width);
+  for (View& view : rig.views) {
+    view.camera.height = size.height;
+    view.camera.cy += 0.5 * (size.height - size.width);
+  }
+  return rig;
+}
+
+/// The first camera of such a rig, and sources like the second one, in these shares of its
+/// baseline.
+inline Rig rig_of_baselines(int size, const std::vector<double>& shares) {
+  Rig rig = fisheye_rig(size);
+  const View source = rig.views[1];
+  rig.views.pop_back();
+  for (const double share : shares) {
+    View& view = rig.views.emplace_back(source);
+    view.name = "cam" + std::to_string(rig.views.size() - 1);
+    view.world_from_camera.translation() *= share;
+  }
   return rig;
 }
 
@@ -157,6 +183,15 @@ class KernelFixture {
       grey.copyTo(image, image >= 0);
     }
     interpolate();
+  }
+
+  /// Lets all views hold a plane of the first one's frame.
+  void hold_in_all_views(const kernel::vec3& m) {
+    for (int i = 0; i < static_cast<int>(views_.size()); ++i) {
+      const kernel::vec3 here =
+          i == 0 ? m : kernel::cpu::plane_in_source(schedule_.parameters.pairs[i], m);
+      view(i).hypotheses.setTo(cv::Scalar(here.x, here.y, here.z, 0.1));
+    }
   }
 
   /// Makes `view` the reference and every other view a source.

@@ -166,5 +166,53 @@ TEST_F(Measure, SubpixelMatchMovesNoFurtherThanAPatchCanTell) {
   }
 }
 
+TEST(AgreeingSource, IsTheFastestOfThoseThatAgreeAndTellDistances) {
+  const auto chosen = [](const std::vector<double>& baselines) {
+    const kernel::vec3 wall(0.05f, 0.1f, 0.5f);
+    KernelFixture fixture(rig_of_baselines(96, baselines), wide_range());
+    fixture.set_reference(0);
+    fixture.hold_in_all_views(wall);
+    fixture.view(1).hypotheses *= 3;  // disagrees
+    kernel::vec2 velocity;
+    return kernel::cpu::agreeing_source(fixture.context(), {48, 48},
+                                        to_kernel(fixture.view(0).rays(48, 48)), wall, velocity);
+  };
+  EXPECT_EQ(chosen({1, 0.8, 0.6}), 2);
+  EXPECT_EQ(chosen({1, 0.6, 0.8}), 3);
+  EXPECT_EQ(chosen({1, 0.01}), 1) << "the other one would agree with any plane";
+}
+
+/// Of planes that are 0.3 px off and matches that are not precise.
+TEST(SubpixelMatch, TakesAllOfTheShiftOrTheShareThatThePrecisionIsWorth) {
+  KernelFixture fixture(fisheye_rig(128), wide_range("fast"));
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+  fixture.show(render_plane(fixture.rig(), normal, 2));
+  fixture.set_reference(0);
+  const auto error_left = [&](unsigned how) {
+    fixture.pass().candidates = how;
+    double sum = 0;
+    int count = 0;
+    for (int y = 34; y < 94; y += 5) {
+      for (int x = 34; x < 94; x += 5, ++count) {
+        const Eigen::Vector3d ray = fixture.ray(0, {x, y});
+        const double truth = normal.dot(ray) / 2;
+        kernel::vec2 velocity;
+        kernel::cpu::telling_source(fixture.context(), to_kernel(ray), static_cast<float>(truth),
+                                    velocity);
+        const double speed = std::hypot(velocity.x, velocity.y);
+        const kernel::vec3 m = to_kernel(normal / 2 + 0.3 / speed * ray);
+        fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, 0.1f);
+        fixture.view(0).checks(y, x) =
+            cv::Vec4f(1e-3f, static_cast<float>(speed), dot(m, to_kernel(ray)), 0.5f);
+        kernel::cpu::subpixel_pixel(fixture.context(), {x, y});
+        sum += std::pow((static_cast<double>(fixture.view(0).checks(y, x)[2]) - truth) * speed, 2);
+      }
+    }
+    return std::sqrt(sum / count);
+  };
+  EXPECT_GT(error_left(0), 0.24);
+  EXPECT_LT(error_left(WHOLE_SHIFT), 0.1);
+}
+
 }  // namespace
 }  // namespace widestereo::test

@@ -2,8 +2,11 @@
 // Plane algebra and random numbers of the shared kernel source against independent arithmetic.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <random>
 #include <set>
+#include <tuple>
 
 #include "geometry/angle.h"
 #include "kernel_fixture.h"
@@ -103,6 +106,33 @@ TEST(Search, DrawsStayAdmissible) {
     } else {
       EXPECT_NEAR(mean_inverse / n, (2 + 0.05) / 2, 0.04);
     }
+  }
+}
+
+TEST(Search, PerturbationsAreOfWhatIsSampledUniformly) {
+  for (const auto& [sampling, held, range] : {std::tuple(DistanceSampling::uniform, 10.0, 19.5),
+                                              {DistanceSampling::inverse, 0.1, 1.95}}) {
+    Options options;
+    options.min_distance = 0.5;
+    options.max_distance = 20;
+    options.sampling = sampling;
+    KernelFixture fixture(fisheye_rig(64), options);
+    fixture.set_reference(0);
+    double low = std::numeric_limits<double>::infinity();
+    double high = 0;
+    for (int y = 10; y < 54; ++y) {
+      for (int x = 10; x < 54; ++x) {
+        const vec3 ray = to_kernel(fixture.view(0).rays(y, x));
+        const vec3 m =
+            kernel::cpu::perturbed_plane(fixture.context(), ivec2(x, y), ray, 0.1f * ray, 0.01f, 4);
+        const auto w = static_cast<double>(dot(m, ray));
+        low = std::min(low, sampling == DistanceSampling::uniform ? 1 / w : w);
+        high = std::max(high, sampling == DistanceSampling::uniform ? 1 / w : w);
+      }
+    }
+    const double reach = 0.01 * 0.25 * range;
+    EXPECT_NEAR(low, held - reach, 0.03 * reach);
+    EXPECT_NEAR(high, held + reach, 0.03 * reach);
   }
 }
 

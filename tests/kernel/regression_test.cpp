@@ -199,11 +199,16 @@ TEST_F(Regression, GoesByIntensityWhereSurfacesLieNearEachOther) {
   for (int x = 48; x < size; ++x) {
     for (int y = 0; y < size; ++y) fixture_.view(0).checks(y, x)[3] = grey + 0.3f;
   }
-  EXPECT_LT(over_pixels(42, 53,
-                        [&](ivec2 pixel) {
-                          return displacement(pixel, regressed(pixel, 18, 0.015), step(pixel.x));
-                        }),
-            0.05);
+  const auto error = [&] {
+    return over_pixels(42, 53, [&](ivec2 pixel) {
+      return displacement(pixel, regressed(pixel, 18, 0.015), step(pixel.x));
+    });
+  };
+  EXPECT_LT(error(), 0.05);
+  Options blind = wide_range("fast");
+  blind.regression_scale = 10000;  // grey levels
+  fixture_.schedule().parameters.support = make_schedule(fixture_.rig(), blind).parameters.support;
+  EXPECT_GT(error(), 0.08);
 }
 
 TEST_F(Regression, DoesNotBlendSurfacesThatAreMeasuredBadly) {
@@ -355,6 +360,62 @@ TEST_F(Regression, FiltersSmallMoves) {
     EXPECT_NEAR(-whole * speed, pixels, 0.01);
     EXPECT_NEAR(filtered / whole, share, 0.03);
   }
+}
+
+/// Of the nearest pixels only those on a line are measured, and the pixel's own plane is turned
+/// about it: they agree with it.
+TEST_F(Regression, OfNormalsGoesBeyondWhatLiesOnALine) {
+  const Eigen::Vector3d truth(0, 0, 0.5);
+  for (const int diagonal : {1, -1}) {
+    measure([&truth](int) { return truth; }, 0.02, 0);
+    for (int y = 40; y <= 56; ++y) {
+      for (int x = 40; x <= 56; ++x) {
+        if (x - 48 != diagonal * (y - 48)) fixture_.view(0).checks(y, x)[0] = UNMEASURED_VARIANCE;
+      }
+    }
+    const Eigen::Vector3d turned(0.06, -0.06 * diagonal, 0.5);
+    fixture_.view(0).hypotheses(48, 48) =
+        cv::Vec4f(0.06f, static_cast<float>(turned.y()), 0.5f, 0.1f);
+    ASSERT_GT(degrees_between(turned, truth), 9);
+    EXPECT_LT(degrees_between(regressed({48, 48}, 48, 0, 8), truth), 2) << diagonal;
+  }
+}
+
+TEST(AveragesOverFrames, TakeLessOfSlopesThanOfDistances) {
+  const kernel::cpu::LocalPlane held{0.5f, 0, 0};
+  const kernel::cpu::LocalPlane regressed{0.51f, 0.2f, -0.3f};
+  const kernel::cpu::LocalPlane filtered = kernel::cpu::filtered_plane(held, regressed, 3);
+  const float share = (filtered.offset - held.offset) / 0.01f;
+  EXPECT_GT(share, 0.1f);
+  EXPECT_LT(share, 0.3f);
+  const float of_slopes = share * share * share;
+  EXPECT_NEAR(filtered.slope_x, 0.2f * of_slopes, 1e-5);
+  EXPECT_NEAR(filtered.slope_y, -0.3f * of_slopes, 1e-5);
+}
+
+TEST(Adopting, APlaneThatNoSourceSeesLeavesTheHeldOneWithItsCost) {
+  KernelFixture fixture(fisheye_rig(size), wide_range("fast"));
+  fixture.set_reference(0);
+  fixture.pass().candidates = HELD_UNSEEN;
+  int found = 0;
+  for (int y = 20; y < 76; y += 4) {
+    for (int x = 0; x < size; ++x) {
+      const kernel::vec3 ray = to_kernel(fixture.view(0).rays(y, x));
+      const kernel::vec3 far = 0.05f * ray;
+      const kernel::vec3 near = 4.0f * ray;
+      const auto cost = [&](const kernel::vec3& m) {
+        return kernel::cpu::patch_cost(fixture.context(), {x, y}, m);
+      };
+      const bool has_ray = fixture.view(0).rays(y, x)[3] != 0;
+      if (!has_ray || cost(far) >= INVALID_COST || cost(near) < INVALID_COST) continue;
+      ++found;
+      fixture.view(0).hypotheses(y, x) = cv::Vec4f(far.x, far.y, far.z, 0.3f);
+      fixture.view(0).priors(y, x) = cv::Vec4f(near.x, near.y, near.z, 1);
+      kernel::cpu::adopt_pixel(fixture.context(), {x, y});
+      EXPECT_EQ(fixture.view(0).hypotheses(y, x), cv::Vec4f(far.x, far.y, far.z, cost(far)));
+    }
+  }
+  EXPECT_GT(found, 10);
 }
 
 }  // namespace

@@ -285,5 +285,26 @@ TEST(Checks, AmbiguityIsLookedForOnceAndOnlyWhereItIsAskedFor) {
   }
 }
 
+TEST(WarmRegressions, AreOverHalfTheNeighboursAndTheLastOneFindsNormals) {
+  for (const auto& [preset, steps] : {std::pair("fast", 2), {"quality", 4}}) {
+    Options options = Options::preset_named(preset);
+    options.warm_regressions = 3;
+    const auto all = passes(make_warm_schedule(rig_of(2), options), Kernel::regress);
+    ASSERT_EQ(all.size(), 3u);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      EXPECT_EQ((all[i].candidates & REGRESS_NORMALS) != 0, i == 2);
+      EXPECT_EQ(all[i].steps, steps);
+    }
+  }
+}
+
+TEST(Votes, HaveGridsThatLieElsewhereEachTime) {
+  const auto all = passes(make_schedule(rig_of(2), Options::preset_named("fast")), Kernel::vote);
+  std::set<int> iterations;
+  for (const kernel::PassParameters& pass : all) iterations.insert(pass.iteration);
+  EXPECT_GT(all.size(), 1u);
+  EXPECT_EQ(iterations.size(), all.size());
+}
+
 }  // namespace
 }  // namespace widestereo::test

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <vector>
@@ -206,10 +208,15 @@ TEST(OtherSurfaces, ReplaceWhatHardlyMatchesByWhatMatchesMuchBetter) {
   EXPECT_NE(taken_costs(CANDIDATE_RANDOM_DISTANCE, 0.24f), std::vector<float>());
 }
 
-/// The planes of `iterations` of the paper's search, all of which start with such checks.
-cv::Mat planes_after(int iterations, std::optional<float> checks) {
+Options small_patches() {
   Options options = wide_range("paper");
   options.window_radius = 2;
+  return options;
+}
+
+/// The planes of `iterations` of the paper's search, all of which start with such checks.
+cv::Mat planes_after(int iterations, std::optional<float> checks,
+                     const Options& options = small_patches()) {
   KernelFixture fixture(fisheye_rig(48), options);
   fixture.set_reference(0);
   const auto over_pixels = [&](int colour, const auto& function) {
@@ -230,6 +237,53 @@ cv::Mat planes_after(int iterations, std::optional<float> checks) {
     }
   }
   return fixture.view(0).hypotheses.clone();
+}
+
+/// As the paper says: distances from all of a quarter of the range around the held one, normals
+/// from 180 and 90 degrees around it, halved from candidate to candidate.
+TEST(Refinement, HalvesTheRangesEachTime) {
+  Options options = wide_range("paper");
+  options.min_distance = 1;
+  options.max_distance = 41;
+  KernelFixture fixture(fisheye_rig(size), options);
+  fixture.set_reference(0);
+  constexpr double quarter = 10, held_distance = 21;
+  constexpr int neighbours = 4, refinements = 4;
+  for (int i = 0; i < refinements; ++i) {
+    const double share = std::pow(0.5, i);
+    Spread distance;
+    Spread turned;  // radians, about the ray; both of its angles together turn it at most so far
+    for (int y = 24; y < 72; ++y) {
+      for (int x = 24; x < 72; ++x) {
+        const Eigen::Vector3d r = fixture.ray(0, {x, y});
+        const vec3 held = to_kernel(r / held_distance);
+        const Eigen::Vector3d m = to_eigen(kernel::cpu::candidate_plane(
+            fixture.context(), {x, y}, to_kernel(r), kernel::vec4(held, 0.1f), neighbours + i));
+        distance.add((1 / m.dot(r) - held_distance) / (quarter * share));
+        turned.add(std::acos(std::min(std::abs(m.normalized().dot(r)), 1.0)) /
+                   (std::numbers::pi * share));
+      }
+    }
+    EXPECT_NEAR(distance.low, -1, 0.01) << i;
+    EXPECT_NEAR(distance.mean, 0, 0.05) << i;
+    EXPECT_NEAR(distance.high, 1, 0.01) << i;
+    EXPECT_LT(turned.high, 1.5) << i;
+    // Before, that is as far as an axis turns.
+    if (i > 1) {
+      EXPECT_GT(turned.high, 0.5) << i;
+    }
+  }
+}
+
+TEST(Refinement, TriesAsManyPlanesAsAsked) {
+  std::vector<double> mean_costs;
+  for (const int refinements : {0, 1, 4}) {
+    Options options = small_patches();
+    options.refinements = refinements;
+    mean_costs.push_back(cv::mean(planes_after(1, std::nullopt, options))[3]);
+  }
+  EXPECT_LT(mean_costs[1], 0.98 * mean_costs[0]);
+  EXPECT_LT(mean_costs[2], 0.98 * mean_costs[1]);
 }
 
 TEST(Propagation, TriesPlanesOnceWithTheBitsOfTryingThemAgain) {
@@ -282,6 +336,27 @@ TEST(FarPreference, DecidesWithoutTextureAndYieldsToIt) {
   ASSERT_LT(of_far, 0.1);
   EXPECT_NEAR(chosen_distance(2, of_far / 1.03, 90), 90, 0.01) << "nearly as good";
   EXPECT_NEAR(chosen_distance(2, of_far / 1.12, 90), 2, 1e-4) << "a tenth worse";
+}
+
+TEST_F(Candidates, AreTriedByPixelsThatLostTheirPlane) {
+  fixture_.hold_in_all_views(wall_);
+  fixture_.view(0).hypotheses(middle, middle) = cv::Vec4f(0, 0, 0, INVALID_COST);
+  fixture_.pass().candidates = 1u << STRIP_LEFT;
+  fixture_.pass().tolerance = 2;
+  kernel::cpu::search_pixel(fixture_.context(), {middle, middle});
+  EXPECT_EQ(fixture_.view(0).hypotheses(middle, middle)[2], wall_.z);
+}
+
+TEST(FarPreference, TriesPlanesAgainWhoseTurnDependsOnWhatIsHeld) {
+  for (const double preference : {0.0, 0.08}) {
+    Options options = wide_range("paper");
+    options.far_preference = preference;
+    KernelFixture fixture(fisheye_rig(48), options);
+    fixture.set_reference(0);
+    fixture.pass().iteration = 5;
+    fixture.pass().colour = 0;
+    EXPECT_EQ(kernel::cpu::is_new_plane(fixture.context(), {24, 24}), preference > 0);
+  }
 }
 
 }  // namespace

@@ -217,5 +217,94 @@ TEST(Transfer, SurfacesContinueIntoHolesFromEveryDirection) {
   }
 }
 
+template <class Function>
+void over_pixels(KernelFixture& fixture, int view, Function function) {
+  const kernel::cpu::Context context = fixture.context();
+  const cv::Size of_view = fixture.view(view).rays.size();
+  for (int y = 0; y < of_view.height; ++y) {
+    for (int x = 0; x < of_view.width; ++x) function(context, ivec2{x, y});
+  }
+}
+
+TEST(MovingOn, KeepsThePlanesOfImagesThatAreNotSquare) {
+  const vec3 wall(0.05f, 0.1f, 0.5f);
+  for (const cv::Size image : {cv::Size(96, 64), cv::Size(64, 96)}) {
+    const Rig rig = fisheye_rig(image);
+    KernelFixture fixture(rig, wide_range("fast"));
+    set_motion(fixture.schedule(), rig, Eigen::Isometry3d::Identity(), 1);
+    fixture.view(0).hypotheses.setTo(cv::Scalar(wall.x, wall.y, wall.z, 0.1));
+    fixture.set_reference(0);
+    fixture.pass().other = 0;
+    over_pixels(fixture, 0, kernel::cpu::transfer_clear_pixel);
+    over_pixels(fixture, 0, kernel::cpu::transfer_nearest_pixel);
+    over_pixels(fixture, 0, kernel::cpu::transfer_winner_pixel);
+    over_pixels(fixture, 0, kernel::cpu::transfer_keep_pixel);
+    int seen = 0;
+    int lost = 0;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const cv::Vec4f ray = fixture.view(0).rays(y, x);
+        const float slant = dot(to_kernel(ray), wall) / std::sqrt(dot(wall, wall));
+        if (ray[3] == 0 || slant < 0.2f) continue;
+        ++seen;
+        lost += fixture.view(0).priors(y, x)[2] != wall.z;
+      }
+    }
+    EXPECT_GT(seen, 1000);
+    EXPECT_EQ(lost, 0) << image;
+  }
+}
+
+/// Of a view of another size; every pixel of the first view holds another distance.
+TEST(Transfer, TakesPlanesFromThePixelsThatSeeThePoint) {
+  Rig rig = fisheye_rig(96);
+  rig.views[0].camera = fisheye_camera(120);
+  const auto inverse_distance = [](double x, double y) { return 0.4 + 0.0005 * x + 0.0007 * y; };
+  KernelFixture fixture(rig, wide_range());
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < 120; ++x) {
+      const vec3 m = to_kernel(inverse_distance(x, y) * fixture.ray(0, {x, y}));
+      fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, 0.1f);
+    }
+  }
+  fixture.set_reference(1);
+  fixture.pass().other = 0;
+  over_pixels(fixture, 1, kernel::cpu::transfer_clear_pixel);
+  over_pixels(fixture, 0, kernel::cpu::transfer_nearest_pixel);
+  over_pixels(fixture, 0, kernel::cpu::transfer_winner_pixel);
+  over_pixels(fixture, 1, kernel::cpu::transfer_gather_pixel);
+  const Eigen::Isometry3d back = source_from_reference(rig.views[0], rig.views[1]);
+  int wrong = 0;
+  for (int y = 30; y < 66; ++y) {
+    for (int x = 30; x < 66; ++x) {
+      const Eigen::Vector3d m = to_eigen(to_kernel(fixture.view(1).hypotheses(y, x)));
+      const Eigen::Vector3d ray = fixture.ray(1, {x, y});
+      const Eigen::Vector3d point = back * (ray / m.dot(ray));
+      Eigen::Vector2d pixel;
+      const bool is_seen = project(rig.views[0].camera, point, pixel);
+      const double error = 1 / point.norm() / inverse_distance(pixel.x(), pixel.y()) - 1;
+      wrong += !is_seen || std::abs(error) > 0.01;
+    }
+  }
+  EXPECT_LT(wrong, 0.02 * 36 * 36);
+}
+
+TEST(Transfer, ComparesDistancesFromTheViewThatPlanesGoTo) {
+  const Rig rig = fisheye_rig(96);
+  KernelFixture fixture(rig, wide_range());
+  fixture.set_reference(1);
+  fixture.pass().other = 0;
+  fixture.view(0).hypotheses.setTo(cv::Scalar(0, 0, 3, 0.1));  // as near as the baseline is long
+  for (const ivec2 pixel : {ivec2(48, 48), ivec2(66, 48), ivec2(30, 40)}) {
+    ivec2 corner(0, 0);
+    float w = 0;
+    ASSERT_TRUE(kernel::cpu::forward_warp(fixture.context(), pixel, corner, w));
+    const Eigen::Vector3d ray = fixture.ray(0, pixel);
+    const Eigen::Vector3d point =
+        source_from_reference(rig.views[1], rig.views[0]) * (ray / (3 * ray.z()));
+    EXPECT_NEAR(static_cast<double>(w) * point.norm(), 1, 1e-4);
+  }
+}
+
 }  // namespace
 }  // namespace widestereo::test

@@ -195,5 +195,28 @@ TEST(VoteOnATexturedWall, WhatPassedTheChecksTellsHowExposuresDiffer) {
   }
 }
 
+TEST(VoteInOneOfTwoSources, AsksTheSourceOfTheCheck) {
+  KernelFixture fixture(rig_of_baselines(96, {0.5, 1}), wide_range("fast"));
+  fixture.set_reference(0);
+  fixture.view(0).image().setTo(0.5);
+  // Sources of different exposure by turns.
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      fixture.view(0).checks(y, x) =
+          x / 10 % 2 == 0 ? cv::Vec4f(1, 0, 0.25f, 0) : cv::Vec4f(2, 0, 0.5f, 0);
+    }
+  }
+  EXPECT_NEAR(kernel::cpu::gain_around(fixture.context(), 1, {48, 48}), 2, 0.01);
+  EXPECT_NEAR(kernel::cpu::gain_around(fixture.context(), 2, {48, 48}), 1, 0.01);
+  const auto asked = [&] {
+    kernel::vec2 velocity;
+    const kernel::vec3 ray = to_kernel(fixture.view(0).rays(48, 48));
+    return kernel::cpu::checked_source(fixture.context(), {48, 48}, ray, 0.5f, velocity);
+  };
+  EXPECT_EQ(asked(), 1);
+  fixture.view(0).checks(48, 48)[3] = REASON_INCONSISTENT | REASON_FILLED;
+  EXPECT_EQ(asked(), 2) << "the check was of the plane that was rejected";
+}
+
 }  // namespace
 }  // namespace widestereo::test

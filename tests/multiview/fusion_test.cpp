@@ -301,6 +301,18 @@ TEST_F(Fusion, PixelsOfACoarseAndAFinePointStandForTheFineOne) {
   EXPECT_EQ(points_ahead(4), points_ahead(3)) << "which the fourth sees as finely";
 }
 
+TEST_F(Fusion, PointsHaveTheImagesColours) {
+  maps_[0].image = cv::Mat(side, side, CV_8UC3, cv::Scalar(10, 20, 30));  // blue, green, red
+  FusionOptions options;
+  options.min_views = 1;
+  const PointCloud cloud = fuse(
+      {views_[0]}, {{}}, [this](std::size_t view) { return maps_[view]; }, options);
+  ASSERT_FALSE(cloud.empty());
+  EXPECT_EQ(cloud[0].red, 30);
+  EXPECT_EQ(cloud[0].green, 20);
+  EXPECT_EQ(cloud[0].blue, 10);
+}
+
 TEST_F(Fusion, NoiseIsAveraged) {
   cv::RNG random(3);
   for (ViewMaps& maps : maps_) {

@@ -129,6 +129,29 @@ TEST(AssumedPoints, AreListedForTheirOwnViewAndOthersOfManyBaselines) {
   EXPECT_LT(*centimetres.rbegin(), 100);
 }
 
+/// From behind, views see a point ahead under smaller angles than from before it.
+TEST(AssumedPoints, AreSeenByMoreViewsFromBehindThanFromBefore) {
+  std::vector<View> views;
+  for (int i = 0; i < 200; ++i) {
+    views.push_back(view_at(0));
+    views.back().world_from_camera.translation().z() = 0.02 * i;
+  }
+  const std::vector<ObservedPoint> points = assumed_points(views, 3.3, 3.5);
+  constexpr std::size_t of_view = 4 * 4 * 4;
+  constexpr int middle = 100;
+  std::set<int> places;  // along the way, from the middle one
+  for (std::size_t i = 0; i < of_view; ++i) {
+    for (const std::size_t observer : points[middle * of_view + i].observers) {
+      if (observer != middle) places.insert(static_cast<int>(observer) - middle);
+    }
+  }
+  const auto first_ahead = places.lower_bound(0);
+  ASSERT_NE(first_ahead, places.begin());
+  ASSERT_NE(first_ahead, places.end());
+  EXPECT_LT(*first_ahead, -*std::prev(first_ahead));
+  EXPECT_LT(*places.begin(), -75);
+}
+
 /// The nearest ones tell no distances.
 TEST(ViewSelection, ViewsOfACameraThatStoodStillAreMatchedWithOthers) {
   std::vector<View> views;
