@@ -190,7 +190,7 @@ cv::Mat CudaBackend::download(const void* memory, int view) {
   const CurrentDevice current = make_current();
   // Applications that have their maps on the device have no use for it.
   if (staging_.get() == nullptr) {
-    staging_ = PinnedMemory(largest_area(sizes_) * sizeof(cv::Vec4f), target_.name);
+    staging_ = TransferMemory(largest_area(sizes_) * sizeof(cv::Vec4f), target_.name);
   }
   const cv::Mat map(size(view), CV_32FC4, staging_.get());
   check(cudaMemcpyAsync(map.data, memory, map.total() * map.elemSize(), cudaMemcpyDeviceToHost,

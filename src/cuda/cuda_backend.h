@@ -114,8 +114,8 @@ class CudaBackend final : public Backend {
   DeviceArray<unsigned> transfer_winner_;
   kernel::cuda::Context context_{};  // all but what differs by launch: pass and parameters
   std::vector<CudaEvent> events_;
-  PinnedMemory staging_;  // of one map
-  Prepared of_run_;       // the last schedule of run()
+  TransferMemory staging_;  // of one map
+  Prepared of_run_;         // the last schedule of run()
   std::vector<Prepared> prepared_;
   bool time_each_ = true;
   KernelTimes times_;

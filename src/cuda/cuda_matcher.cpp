@@ -77,11 +77,7 @@ class CudaMatcher::Implementation {
 
   void enqueue_next(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                     cudaStream_t stream, const CudaWarmStart& start) {
-    if (!holds_planes_) {
-      throw Error(
-          "There are no planes of a previous frame to start from; enqueue one without a warm start "
-          "before.");
-    }
+    require_planes(holds_planes_, "enqueue one without a warm start before.");
     require_fitting(images, maps);
     require_aligned(start.device_now_from_previous);
     const CurrentDevice current = make_current();

@@ -10,6 +10,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "cuda/result.h"
 #include "text/mebibytes.h"
@@ -22,17 +23,24 @@ class SelectedDevice {
   SelectedDevice(int ordinal, const std::string& name) {
     if (ordinal < 0) return;
     check(cudaGetDevice(&previous_), name, "be found by the CUDA runtime");
-    if (previous_ != ordinal) check(cudaSetDevice(ordinal), name, "be made current");
-    changed_ = previous_ != ordinal;
+    if (previous_ == ordinal) return;
+    const cudaError_t result = cudaSetDevice(ordinal);
+    if (result != cudaSuccess) restore();  // it may have changed it nevertheless
+    check(result, name, "be made current");
+    changed_ = true;
   }
   ~SelectedDevice() {
-    // The application's next question must not get an error of this.
-    if (changed_ && cudaSetDevice(previous_) != cudaSuccess) cudaGetLastError();
+    if (changed_) restore();
   }
   SelectedDevice(const SelectedDevice&) = delete;
   SelectedDevice& operator=(const SelectedDevice&) = delete;
 
  private:
+  void restore() const {
+    // The application's next question must not get an error of this.
+    if (cudaSetDevice(previous_) != cudaSuccess) cudaGetLastError();
+  }
+
   int previous_ = 0;
   bool changed_ = false;
 };
@@ -96,22 +104,29 @@ class CudaTexture {
   cudaTextureObject_t object_ = 0;
 };
 
-/// Host memory that the device writes by itself; any other one a driver fills by way of its own, at
-/// a fraction of the speed.
-class PinnedMemory {
+/// Host memory that the device writes by itself, or, where so much cannot be pinned, any other one,
+/// which a driver fills by way of its own, at a fraction of the speed.
+class TransferMemory {
  public:
-  PinnedMemory() = default;
-  PinnedMemory(std::size_t bytes, const std::string& device) {
+  TransferMemory() = default;
+  TransferMemory(std::size_t bytes, const std::string& device) {
     void* memory = nullptr;
-    const std::string action = "pin " + mebibytes(bytes) + " of the host's memory for transfers";
-    check(cudaMallocHost(&memory, bytes), device, action);
-    memory_.reset(memory);
+    const cudaError_t result = cudaMallocHost(&memory, bytes);
+    if (result == cudaErrorMemoryAllocation) {
+      cudaGetLastError();
+      pageable_.resize(bytes);
+      return;
+    }
+    check(result, device, "pin " + mebibytes(bytes) + " of the host's memory for transfers");
+    pinned_.reset(memory);
   }
 
-  void* get() const { return memory_.get(); }
+  /// Null where there is none yet.
+  void* get() { return pinned_ ? pinned_.get() : pageable_.data(); }
 
  private:
-  std::unique_ptr<void, CudaDestroy<&cudaFreeHost>> memory_;
+  std::unique_ptr<void, CudaDestroy<&cudaFreeHost>> pinned_;
+  std::vector<unsigned char> pageable_;
 };
 
 /// Device memory of a number of T, which the stream makes all zero. Nothing here waits for the

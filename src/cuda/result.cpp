@@ -30,7 +30,7 @@ std::string explain(cudaError_t result) {
              name + ".";
     case cudaErrorLaunchTimeout:
       return "a kernel ran into the display's time limit; restart the program with smaller "
-             "dispatches (max_samples_per_dispatch).";
+             "dispatches (max_samples_per_dispatch; of a CudaMatcher smaller images).";
     // After these nothing works on the device until the process ends.
     case cudaErrorIllegalAddress:
     case cudaErrorLaunchFailure:
@@ -41,9 +41,12 @@ std::string explain(cudaError_t result) {
     case cudaErrorInvalidPc:
     case cudaErrorECCUncorrectable:
     case cudaErrorAssert:
-    case cudaErrorUnknown:
       return "the device was lost" + name +
              "; restart the program, and check the driver's log if this repeats.";
+    case cudaErrorUnknown:
+      return "the driver failed" + name +
+             "; restart the program, and if this repeats, as after a suspend, load the driver's "
+             "module nvidia_uvm again or restart the machine.";
     default:
       return std::string(cudaGetErrorString(result)) + name + ".";
   }

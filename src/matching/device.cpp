@@ -52,6 +52,7 @@ const DeviceInfo* find(const std::vector<DeviceInfo>& devices, const Api& api,
   const std::string name_part = lower_case(wanted);
   std::string uuid = name_part;
   std::erase(uuid, '-');
+  if (uuid.starts_with("gpu")) uuid.erase(0, 3);  // as nvidia-smi writes it
   const auto first = [&devices](auto is_wanted) {
     const auto found = std::find_if(devices.begin(), devices.end(), is_wanted);
     return found == devices.end() ? nullptr : &*found;

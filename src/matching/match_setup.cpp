@@ -38,4 +38,9 @@ std::vector<cv::Mat> MatchSetup::set_rays(Backend& backend) const {
   return of_rig;
 }
 
+void require_planes(bool there_are, const std::string& remedy) {
+  if (there_are) return;
+  throw Error("There are no planes of a previous frame to start from; " + remedy);
+}
+
 }  // namespace widestereo

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <vector>
 
 #include "matching/backend.h"
@@ -20,5 +21,9 @@ struct MatchSetup {
   Schedule warm_schedule;  ///< of one that starts from the previous one; set_motion() completes it
   std::vector<cv::Size> sizes;  ///< of each view at each level
 };
+
+/// Throws Error unless there are planes of a frame before to start from; `remedy` ends the
+/// sentence.
+void require_planes(bool there_are, const std::string& remedy);
 
 }  // namespace widestereo

@@ -52,6 +52,8 @@ void VulkanContext::require_usable() {
   properties_ = properties_of(instance_functions_, handles_.physical_device);
   const std::string why = why_unusable(instance_functions_, handles_.physical_device);
   if (!why.empty()) throw Error("The Vulkan device " + name() + " cannot be used: " + why);
+  largest_allocation_ =
+      widestereo::largest_allocation(instance_functions_, handles_.physical_device);
 }
 
 void VulkanContext::create_device() {

@@ -38,6 +38,7 @@ class VulkanContext {
   /// Whether images of intensities can be filtered, in half precision if so.
   bool filters_intensities() const;
   bool filters_half_precision() const;
+  VkDeviceSize largest_allocation() const { return largest_allocation_; }  ///< bytes
   /// First memory type of `allowed` with all of `wanted`, or VK_MAX_MEMORY_TYPES.
   std::uint32_t memory_type(std::uint32_t allowed, VkMemoryPropertyFlags wanted) const;
   /// Hands commands to the queue, from one thread at a time: all matchers of a device share it.
@@ -70,6 +71,7 @@ class VulkanContext {
   OwnedDevice owned_;
   DeviceFunctions functions_;
   std::uint32_t timestamp_bits_ = 0;
+  VkDeviceSize largest_allocation_ = 0;
   mutable std::mutex queue_mutex_;
 };
 

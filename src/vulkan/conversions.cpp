@@ -44,7 +44,7 @@ VkDescriptorBufferInfo part_of_buffer(const Conversion& conversion, int height,
                               pitch * static_cast<VkDeviceSize>(height - 1) + conversion.row_bytes;
   const VkDeviceSize bytes = (length + word - 1) / word * word;
   if (bytes > limits.maxStorageBufferRange || pitch != conversion.pitch) {
-    throw Error("An image or a map with a pitch of " + std::to_string(conversion.pitch) +
+    throw Error(conversion.name + " with a pitch of " + std::to_string(conversion.pitch) +
                 " bytes reaches over " + std::to_string(bytes) +
                 " bytes of its buffer or more; the maxStorageBufferRange of the Vulkan device " +
                 context.name() + " is " + std::to_string(limits.maxStorageBufferRange) +

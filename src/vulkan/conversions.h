@@ -14,6 +14,7 @@ struct Conversion {
   enum class Way { image_from_buffer, image_from_texture, map_to_buffer };
   static constexpr std::size_t ways = 3;
 
+  std::string name;  ///< of the image or map, in messages
   Way way = Way::image_from_buffer;
   int view = 0;
   int kind = 0;  ///< PIXEL_GREY8, TEXELS_GREY, MAP_DISTANCE and the like (shaders/maps.glsl)

@@ -3,6 +3,8 @@
 
 #include <dlfcn.h>
 
+#include <string>
+
 #include "widestereo/error.h"
 
 namespace widestereo {
@@ -19,16 +21,20 @@ constexpr const char* library_names[] = {"libvulkan.so.1", "libvulkan.so"};
 }  // namespace
 
 VulkanLoader::VulkanLoader() {
+  std::string why;
   for (const char* name : library_names) {
     library_ = dlopen(name, RTLD_NOW | RTLD_LOCAL);
     if (library_ != nullptr) break;
+    if (why.empty()) why = dlerror();
   }
   if (library_ != nullptr) {
     get_ = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library_, "vkGetInstanceProcAddr"));
+    if (get_ == nullptr) why = "it has no vkGetInstanceProcAddr";
   }
   if (get_ == nullptr) {
     if (library_ != nullptr) dlclose(library_);
-    throw Error("The Vulkan loader is not installed; install it (libvulkan1) and a driver.");
+    throw Error("The Vulkan loader cannot be opened (" + why +
+                "); install it (libvulkan1) and a driver.");
   }
 }
 

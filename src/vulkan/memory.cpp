@@ -8,9 +8,23 @@
 namespace widestereo {
 namespace {
 
+VkDeviceSize bytes_of(VkFormat format) {
+  return format == VK_FORMAT_R16_SFLOAT ? 2 : format == VK_FORMAT_R32_SFLOAT ? 4 : 16;
+}
+
+void require_limit(const VulkanContext& context, VkDeviceSize bytes, const std::string& limit,
+                   VkDeviceSize offered, const std::string& purpose) {
+  if (bytes <= offered) return;
+  throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " of " +
+              mebibytes(bytes) + ": its " + limit + " is " + mebibytes(offered) +
+              "; use smaller images or another device.");
+}
+
 Handle<VkDeviceMemory> allocate(const VulkanContext& context,
                                 const VkMemoryRequirements& requirements, std::uint32_t type,
                                 const std::string& purpose) {
+  require_limit(context, requirements.size, "maxMemoryAllocationSize", context.largest_allocation(),
+                purpose);
   VkMemoryAllocateInfo info{};
   info.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO;
   info.allocationSize = requirements.size;
@@ -59,22 +73,14 @@ Buffer make_buffer(const VulkanContext& context, VkDeviceSize bytes, VkBufferUsa
   return result;
 }
 
-VkDeviceSize bytes_of(VkFormat format) {
-  return format == VK_FORMAT_R16_SFLOAT ? 2 : format == VK_FORMAT_R32_SFLOAT ? 4 : 16;
-}
-
-void require_buffer_limit(const VulkanContext& context, VkDeviceSize bytes,
-                          const std::string& limit, VkDeviceSize offered,
-                          const std::string& purpose) {
-  if (bytes <= offered) return;
-  throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " of " +
-              mebibytes(bytes) + ": its " + limit + " is " + mebibytes(offered) +
-              "; use smaller images or another device.");
-}
-
 void require_image_limits(const VulkanContext& context, VkFormat format, cv::Size size, int layers,
                           VkImageUsageFlags usage, const std::string& purpose) {
   const VkImageFormatProperties limits = context.image_limits(format, usage);
+  if (limits.maxExtent.width == 0) {
+    throw Error("The Vulkan device " + context.name() + " has no images of the format " +
+                std::to_string(format) + " for " + purpose +
+                "; update its driver or use another device.");
+  }
   const auto refuse = [&](const std::string& limit, const std::string& offered) {
     throw Error("The Vulkan device " + context.name() + " cannot hold " + purpose + " (" +
                 size_text(size.width, size.height) + " pixels, " + std::to_string(layers) +
@@ -101,8 +107,8 @@ void require_image_limits(const VulkanContext& context, VkFormat format, cv::Siz
 Buffer make_device_buffer(const VulkanContext& context, VkDeviceSize bytes,
                           VkBufferUsageFlags usage, const std::string& purpose) {
   if ((usage & VK_BUFFER_USAGE_STORAGE_BUFFER_BIT) != 0) {
-    require_buffer_limit(context, bytes, "maxStorageBufferRange",
-                         context.properties().limits.maxStorageBufferRange, purpose);
+    require_limit(context, bytes, "maxStorageBufferRange",
+                  context.properties().limits.maxStorageBufferRange, purpose);
   }
   return make_buffer(context, bytes, usage, device_memory_type, purpose);
 }
@@ -119,9 +125,9 @@ MapBuffer make_map_buffer(const VulkanContext& context, VkDeviceSize elements, V
         make_device_buffer(context, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | transfers, purpose);
     return map;
   }
-  require_buffer_limit(
-      context, bytes, "maxTexelBufferElements times " + std::to_string(bytes_of_element) + " bytes",
-      context.properties().limits.maxTexelBufferElements * bytes_of_element, purpose);
+  require_limit(context, bytes,
+                "maxTexelBufferElements times " + std::to_string(bytes_of_element) + " bytes",
+                context.properties().limits.maxTexelBufferElements * bytes_of_element, purpose);
   map.buffer = make_device_buffer(context, bytes,
                                   VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT | transfers, purpose);
   VkBufferViewCreateInfo info{};

@@ -83,6 +83,16 @@ VkPhysicalDeviceProperties properties_of(const InstanceFunctions& vk, VkPhysical
   return properties;
 }
 
+VkDeviceSize largest_allocation(const InstanceFunctions& vk, VkPhysicalDevice device) {
+  VkPhysicalDeviceMaintenance3Properties limits{};
+  limits.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES;
+  VkPhysicalDeviceProperties2 properties{};
+  properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+  properties.pNext = &limits;
+  vk.vkGetPhysicalDeviceProperties2(device, &properties);
+  return limits.maxMemoryAllocationSize;
+}
+
 bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name) {
   std::uint32_t count = 0;
   if (vk.vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr) != VK_SUCCESS) {

@@ -33,6 +33,9 @@ std::uint32_t timestamp_bits(const InstanceFunctions& vk, VkPhysicalDevice devic
 
 bool has_device_extension(const InstanceFunctions& vk, VkPhysicalDevice device, const char* name);
 
+/// Most bytes of one allocation, at least 2^30. `device` must offer Vulkan 1.1.
+VkDeviceSize largest_allocation(const InstanceFunctions& vk, VkPhysicalDevice device);
+
 /// Whether kernels load texels and read maps as texel buffers, as is faster on devices that are
 /// programs, rather than sample textures: where limits allow so many, for texel buffers count as
 /// images.

@@ -27,7 +27,8 @@ std::string reason(VkResult result) {
     case VK_ERROR_FEATURE_NOT_PRESENT:
       return "a feature is missing; update the driver or use another device.";
     default:
-      return "Vulkan error " + std::to_string(static_cast<int>(result)) + ".";
+      return "Vulkan error " + std::to_string(static_cast<int>(result)) +
+             "; update the driver, or use smaller images or another device.";
   }
 }
 

@@ -82,7 +82,6 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       pipelines_(make_pipelines(context, constants,
                                 tuning.sampled.value_or(!loads_texels(context.properties())),
                                 cache.get())),
-      staging_(make_staging_buffer(context, largest_area(sizes) * sizeof(cv::Vec4f))),
       sampler_(make_sampler(context, pipelines_.filters())),
       command_pool_(make_command_pool(context)) {
   cache.save();
@@ -272,10 +271,17 @@ void VulkanBackend::barrier(VkCommandBuffer commands, VkPipelineStageFlags from,
   context_.vk().vkCmdPipelineBarrier(commands, from, to, 0, 1, &memory, 0, nullptr, 0, nullptr);
 }
 
+const Buffer& VulkanBackend::staging() {
+  if (staging_.mapped == nullptr) {
+    staging_ = make_staging_buffer(context_, largest_area(sizes_) * sizeof(cv::Vec4f));
+  }
+  return staging_;
+}
+
 void VulkanBackend::stage(int view, const cv::Mat& map, int type) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   require_map(map, view, size, type);
-  map.copyTo(cv::Mat(size, type, staging_.mapped));
+  map.copyTo(cv::Mat(size, type, staging().mapped));
 }
 
 VkDeviceSize VulkanBackend::first_byte_of_map(int view) const {
@@ -299,14 +305,15 @@ void VulkanBackend::upload(const MapBuffer& map, int view, const cv::Mat& values
 cv::Mat VulkanBackend::download(const MapBuffer& map, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   const VkBufferCopy all = {first_byte_of_map(view), 0, map_bytes(view)};
+  const Buffer& received = staging();
   const VkCommandBuffer commands = submissions_[0]->begin();
   barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_TRANSFER_BIT,
           VK_ACCESS_TRANSFER_READ_BIT);
-  context_.vk().vkCmdCopyBuffer(commands, map.buffer.handle.get(), staging_.handle.get(), 1, &all);
+  context_.vk().vkCmdCopyBuffer(commands, map.buffer.handle.get(), received.handle.get(), 1, &all);
   barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
   submissions_[0]->submit();
   submissions_[0]->wait();
-  return cv::Mat(size, CV_32FC4, staging_.mapped);
+  return cv::Mat(size, CV_32FC4, received.mapped);
 }
 
 void VulkanBackend::set_rays(int view, const cv::Mat& rays) { upload(rays_, view, rays); }

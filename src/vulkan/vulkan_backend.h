@@ -60,6 +60,8 @@ class VulkanBackend final : public Backend {
   void time_kernels(bool each) override { time_each_ = each; }
   double device_milliseconds() const override { return milliseconds_; }
   std::size_t device_bytes() const override;
+  /// Frees what transfers from and to the host have taken, and take again.
+  void release_staging() { staging_ = {}; }
 
  private:
   struct Run;  // of run(): what is in flight
@@ -87,6 +89,7 @@ class VulkanBackend final : public Backend {
   /// Lets later commands of some stages see what earlier ones of others wrote.
   void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkPipelineStageFlags to,
                VkAccessFlags access) const;
+  const Buffer& staging();
   /// Puts a map for a view into the staging buffer.
   void stage(int view, const cv::Mat& map, int type);
   void upload(const MapBuffer& map, int view, const cv::Mat& values);
@@ -112,7 +115,7 @@ class VulkanBackend final : public Backend {
   Buffer places_;
   Buffer transfer_nearest_;
   Buffer transfer_winner_;
-  Buffer staging_;
+  Buffer staging_;  // once something is transferred; of the largest view's maps
   Handle<VkSampler> sampler_;
   Handle<VkDescriptorPool> descriptor_pool_;
   std::vector<VkDescriptorSet> descriptor_sets_;  // of each level

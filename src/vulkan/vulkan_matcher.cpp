@@ -53,6 +53,7 @@ class VulkanMatcher::Implementation {
         conversions_(context_, backend_, setup_.sizes, cache_) {
     cache_.save();
     setup_.set_rays(backend_);
+    backend_.release_staging();
   }
 
   VulkanBindings bind(std::span<const VulkanImage> images,
@@ -66,7 +67,8 @@ class VulkanMatcher::Implementation {
       const std::string what = "The image of " + rig_.views[i].name;
       if (image.buffer == VK_NULL_HANDLE) throw Error(what + " has no buffer; give one.");
       require_rows({image.offset, image.pitch, pixel, row, "offset"}, what);
-      conversions.push_back({.way = Way::image_from_buffer,
+      conversions.push_back({.name = what,
+                             .way = Way::image_from_buffer,
                              .view = static_cast<int>(i),
                              .kind = static_cast<int>(image.pixel),
                              .buffer = image.buffer,
@@ -83,10 +85,10 @@ class VulkanMatcher::Implementation {
     std::vector<Conversion> conversions;
     for (std::size_t i = 0; i < images.size(); ++i) {
       const VulkanTexture& image = images[i];
-      if (image.view == VK_NULL_HANDLE) {
-        throw Error("The image of " + rig_.views[i].name + " has no image view; give one.");
-      }
-      conversions.push_back({.way = Way::image_from_texture,
+      const std::string what = "The image of " + rig_.views[i].name;
+      if (image.view == VK_NULL_HANDLE) throw Error(what + " has no image view; give one.");
+      conversions.push_back({.name = what,
+                             .way = Way::image_from_texture,
                              .view = static_cast<int>(i),
                              .kind = image.colour ? TEXELS_COLOUR : TEXELS_GREY,
                              .texture = image.view,
@@ -102,11 +104,7 @@ class VulkanMatcher::Implementation {
 
   void record_next(Commands commands, const VulkanBindings::Implementation& bindings,
                    const WarmStart& start) {
-    if (!holds_planes_) {
-      throw Error(
-          "There are no planes of a previous frame to start from; record a match without a warm "
-          "start before.");
-    }
+    require_planes(holds_planes_, "record a match without a warm start before.");
     if (!start.hypotheses.empty()) {
       throw Error(
           "A recorded match starts from the planes on the device; leave the hypotheses empty.");
@@ -131,9 +129,10 @@ class VulkanMatcher::Implementation {
         const VulkanMap& map = maps[i].*of_view.map;
         if (map.buffer == VK_NULL_HANDLE) continue;
         const std::size_t row = width(i) * of_view.values * word;
-        require_rows({map.offset, map.pitch, word, row, "offset"},
-                     of_view.name + rig_.views[i].name);
-        conversions.push_back({.way = Way::map_to_buffer,
+        const std::string what = of_view.name + rig_.views[i].name;
+        require_rows({map.offset, map.pitch, word, row, "offset"}, what);
+        conversions.push_back({.name = what,
+                               .way = Way::map_to_buffer,
                                .view = static_cast<int>(i),
                                .kind = of_view.kind,
                                .buffer = map.buffer,

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <gmock/gmock.h>
+
 #include <algorithm>
 
 #include "vulkan_fixture.h"
@@ -18,10 +20,39 @@ PFN_vkQueueSubmit real_submit = nullptr;
 PFN_vkWaitForFences real_wait = nullptr;
 PFN_vkGetPipelineCacheData real_cache_data = nullptr;
 PFN_vkGetPhysicalDeviceProperties real_properties = nullptr;
+PFN_vkGetPhysicalDeviceProperties2 real_properties_since_1_1 = nullptr;
 PFN_vkGetPhysicalDeviceFormatProperties real_formats = nullptr;
 PFN_vkGetPhysicalDeviceImageFormatProperties real_image_limits = nullptr;
 
 Faults& faults() { return FaultyLoader::faults(); }
+
+/// A function of a device that may fail, named by `Name::text`.
+template <class Function, class Name>
+struct Fallible {
+  static PFN_vkVoidFunction wrap(PFN_vkVoidFunction real) { return real; }  // says no result
+};
+template <class... Arguments, class Name>
+struct Fallible<VkResult(VKAPI_PTR*)(Arguments...), Name> {
+  static inline VkResult(VKAPI_PTR* real)(Arguments...) = nullptr;
+  static VKAPI_ATTR VkResult VKAPI_CALL call(Arguments... arguments) {
+    const int calls_before = faults().calls[Name::text]++;
+    if (faults().failing_function == Name::text && faults().failing_call == calls_before) {
+      return VK_ERROR_OUT_OF_HOST_MEMORY;
+    }
+    return real(arguments...);
+  }
+  static PFN_vkVoidFunction wrap(PFN_vkVoidFunction function) {
+    real = reinterpret_cast<decltype(real)>(function);
+    return reinterpret_cast<PFN_vkVoidFunction>(&call);
+  }
+};
+
+#define DEFINE_NAME(name)                      \
+  struct NameOf_##name {                       \
+    static constexpr const char* text = #name; \
+  };
+WIDESTEREO_DEVICE_FUNCTIONS(DEFINE_NAME)
+#undef DEFINE_NAME
 
 VKAPI_ATTR VkResult VKAPI_CALL allocate(VkDevice device, const VkMemoryAllocateInfo* info,
                                         const VkAllocationCallbacks* callbacks,
@@ -88,8 +119,17 @@ VKAPI_ATTR void VKAPI_CALL properties(VkPhysicalDevice device, VkPhysicalDeviceP
   }
 }
 
-VKAPI_ATTR void VKAPI_CALL properties_since_1_1(VkPhysicalDevice, VkPhysicalDeviceProperties2*) {
-  ADD_FAILURE() << "a device of Vulkan 1.0 has no vkGetPhysicalDeviceProperties2";
+VKAPI_ATTR void VKAPI_CALL properties_since_1_1(VkPhysicalDevice device,
+                                                VkPhysicalDeviceProperties2* out) {
+  EXPECT_FALSE(faults().old_device) << "Vulkan 1.0 has no vkGetPhysicalDeviceProperties2";
+  real_properties_since_1_1(device, out);
+  if (faults().largest_allocation == 0) return;
+  auto* next = static_cast<VkBaseOutStructure*>(out->pNext);
+  for (; next != nullptr; next = next->pNext) {
+    if (next->sType != VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES) continue;
+    reinterpret_cast<VkPhysicalDeviceMaintenance3Properties*>(next)->maxMemoryAllocationSize =
+        faults().largest_allocation;
+  }
 }
 
 VKAPI_ATTR void VKAPI_CALL queue_families(VkPhysicalDevice, std::uint32_t* count,
@@ -125,6 +165,10 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_device(VkDevice device, const char*
   if (wanted == "vkQueueSubmit") return wrap(real, real_submit, &submit);
   if (wanted == "vkWaitForFences") return wrap(real, real_wait, &wait);
   if (wanted == "vkGetPipelineCacheData") return wrap(real, real_cache_data, &cache_data);
+#define WRAP(name) \
+  if (wanted == #name) return Fallible<PFN_##name, NameOf_##name>::wrap(real);
+  WIDESTEREO_DEVICE_FUNCTIONS(WRAP)
+#undef WRAP
   return real;
 }
 
@@ -140,8 +184,8 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL get_instance(VkInstance instance, const
   if (wanted == "vkGetPhysicalDeviceProperties") {
     return wrap(real, real_properties, &properties);
   }
-  if (wanted == "vkGetPhysicalDeviceProperties2" && faults().old_device) {
-    return reinterpret_cast<PFN_vkVoidFunction>(&properties_since_1_1);
+  if (wanted == "vkGetPhysicalDeviceProperties2") {
+    return wrap(real, real_properties_since_1_1, &properties_since_1_1);
   }
   if (wanted == "vkGetPhysicalDeviceQueueFamilyProperties" && !faults().queue_families.empty()) {
     return reinterpret_cast<PFN_vkVoidFunction>(&queue_families);
@@ -160,5 +204,27 @@ Faults& FaultyLoader::faults() {
 }
 
 PFN_vkGetInstanceProcAddr FaultyLoader::get_instance_proc_addr() { return &get_instance; }
+
+void expect_failures_leave_no_object(const std::function<void(const VulkanContext&)>& work) {
+  const FaultyLoader::Scope scope;
+  const auto get = FaultyLoader::get_instance_proc_addr();
+  const VulkanInstance instance(get, true);
+  const auto message = [&] {
+    return error_of(
+        [&] { work(VulkanContext(get, instance.handle(), instance.physical_devices().at(0))); });
+  };
+  ASSERT_EQ(message(), "");
+  const std::map<std::string, int> all_calls = faults().calls;
+  int makers = 0;
+  for (const auto& [name, calls] : all_calls) {
+    if (!name.starts_with("vkCreate") && !name.starts_with("vkAllocate")) continue;
+    ++makers;
+    faults() = {.failing_function = name, .failing_call = calls / 2};
+    EXPECT_THAT(message(), ::testing::HasSubstr("out of host memory")) << name;
+  }
+  EXPECT_GE(makers, 14);
+  // The layer names every object that outlives its device.
+  EXPECT_THAT(instance.validation_messages(), ::testing::IsEmpty());
+}
 
 }  // namespace widestereo::test

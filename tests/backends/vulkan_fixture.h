@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <functional>
+#include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -99,6 +101,9 @@ struct Faults {
   int failing_allocation = -1;  ///< the n-th vkAllocateMemory is out of device memory
   int failing_submission = -1;  ///< the n-th vkQueueSubmit loses the device
   int failing_wait = -1;        ///< the n-th vkWaitForFences loses the device
+  /// The n-th call of another function of the device is out of host memory.
+  std::string failing_function = {};
+  int failing_call = 0;
   bool no_layers = false;
   bool no_formats = false;
   bool no_filtering = false;                      ///< images of no format can be filtered
@@ -108,6 +113,7 @@ struct Faults {
   bool old_device = false;  ///< Vulkan 1.0
   std::uint32_t largest_image = 0;
   VkDeviceSize largest_resource = 0;
+  VkDeviceSize largest_allocation = 0;
   std::uint32_t largest_push_constants = 0;
   std::uint32_t largest_buffer = 0;  ///< bytes
   std::uint32_t storage_buffers = 0;
@@ -117,6 +123,7 @@ struct Faults {
   int allocations = 0;
   int submissions = 0;
   int waits = 0;
+  std::map<std::string, int> calls = {};  ///< of such functions
 };
 
 /// A vkGetInstanceProcAddr around the machine's that injects faults(). The Vulkan API passes no
@@ -131,5 +138,9 @@ class FaultyLoader {
     ~Scope() { faults() = {}; }
   };
 };
+
+/// Does `work` on a device of its own again and again while one function after the other that makes
+/// something fails, in the middle one of its calls.
+void expect_failures_leave_no_object(const std::function<void(const VulkanContext&)>& work);
 
 }  // namespace widestereo::test

@@ -593,6 +593,8 @@ TEST_F(VulkanFailures, MissingFeaturesAreNamed) {
   FaultyLoader::faults() = {.type = type_of_gpu, .largest_buffer = 50000};
   EXPECT_THAT(message_of_match(),
               HasSubstr("the viewing rays of 1 MiB: its maxStorageBufferRange"));
+  FaultyLoader::faults() = {.largest_allocation = 50000};
+  EXPECT_THAT(message_of_match(), HasSubstr("its maxMemoryAllocationSize is 1 MiB"));
   FaultyLoader::faults() = {.type = type_of_gpu, .storage_buffers = 4};
   EXPECT_THAT(message_of_match(), HasSubstr("maxPerStageDescriptorStorageBuffers is 4, but 8"));
   FaultyLoader::faults() = {.largest_push_constants = 16};

@@ -360,6 +360,7 @@ cudaError_t cudaFree(void* memory) {
 }
 cudaError_t cudaMallocHost(void** memory, std::size_t bytes) {
   if (const cudaError_t error = step_outside_capture()) return error;
+  if (!emulation().can_pin) return cudaErrorMemoryAllocation;
   *memory = std::malloc(bytes);
   std::memset(*memory, 0xcd, bytes);
   pinned_memory()[*memory] = bytes;

@@ -21,6 +21,7 @@ struct Emulation {
   bool has_kernels = true;  ///< for these devices
   int major = 9;
   bool time_limit = false;
+  bool can_pin = true;  ///< memory of the host
   std::size_t memory = std::size_t{1} << 30;
 
   long failing_call = -1;  ///< the n-th call that can fail does, with `failure`

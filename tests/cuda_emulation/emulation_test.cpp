@@ -38,8 +38,8 @@ class CudaEmulation : public ::testing::Test {
     }
   }
 
-  void match() {
-    Device device = Device::open("cuda");
+  void match(const char* on = "cuda") {
+    Device device = Device::open(on);
     Matcher matcher(device, rig_, options_);
     matcher.match(images_);
     matcher.match(images_, [](double) {});
@@ -102,6 +102,19 @@ class CudaEmulation : public ::testing::Test {
 
 TEST_F(CudaEmulation, EveryCallMayRunOutOfMemory) {
   fail_every_call([this] { match(); }, cudaErrorMemoryAllocation, false);
+}
+
+TEST_F(CudaEmulation, AnotherDeviceThanTheCurrentOneMayFailAtAnyCall) {
+  emulation().devices = 2;
+  fail_every_call([this] { match("cuda:1"); }, cudaErrorMemoryAllocation, false);
+}
+
+TEST_F(CudaEmulation, ResultsArriveWhereNoMemoryCanBePinned) {
+  Device device = Device::open("cuda");
+  const StereoResult expected = Matcher(device, rig_, options_).match(images_);
+  emulation().can_pin = false;
+  const StereoResult result = Matcher(device, rig_, options_).match(images_);
+  EXPECT_TRUE(same_bits(result.views[1].hypotheses, expected.views[1].hypotheses));
 }
 
 TEST_F(CudaEmulation, TheDeviceMayBeLostAtAnyCall) {
@@ -280,6 +293,9 @@ TEST_F(CudaEmulation, DevicesAreFoundByIndexNameAndUuid) {
   EXPECT_EQ(Device::open("cuda").info().id, "cuda:0");
   EXPECT_EQ(Device::open("cuda:emulated").info().id, "cuda:0");
   EXPECT_EQ(Device::open("cuda:" + devices[1].uuid).info().id, "cuda:1");
+  std::string of_nvidia_smi = "GPU-" + devices[1].uuid;
+  for (const std::size_t dash : {12, 17, 22, 27}) of_nvidia_smi.insert(dash, "-");
+  EXPECT_EQ(Device::open("cuda:" + of_nvidia_smi).info().id, "cuda:1");
   EXPECT_EQ(Device::open("auto").info().id, "cuda:0");
   EXPECT_EQ(Device::list().front().id, "cuda:0");
   EXPECT_THAT(error_of([] { Device::open("cuda:7"); }), HasSubstr("cuda:1 (Emulated GPU)"));
