@@ -28,6 +28,8 @@ constexpr std::size_t fewest_points = 200;
 /// Standard deviation to which every direction of motion must be determined: radians, and metres
 /// per metre of the median distance.
 constexpr double largest_uncertainty = 0.003;
+/// Correlation of the aligned frames: those that have nothing to do with each other stay below.
+constexpr double least_likeness = 0.3;
 
 /// A point of the previous frame.
 struct Point {
@@ -154,7 +156,7 @@ class Alignment {
   /// Whether every direction of motion is determined.
   bool is_determined(const std::vector<ScaledView>& views) {
     const NormalEquations equations = linearise(views);
-    if (equations.points < fewest_points) return false;
+    if (equations.points < fewest_points || !(likeness() >= least_likeness)) return false;
     const Eigen::Index others = equations.information.rows() - 6;
     Eigen::MatrixXd brightness = equations.information.bottomRightCorner(others, others);
     brightness.diagonal().array() += 1e-9;
@@ -192,6 +194,25 @@ class Alignment {
       for (const Point& point : of_view) distances.push_back(point.position.norm());
     }
     return percentile(distances, 0.5);
+  }
+
+  /// Correlation of what the points looked like and look like, over all views.
+  double likeness() const {
+    double shared = 0, of_previous = 0, of_now = 0;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      Eigen::Array2Xd seen(2, rows_[i].size());  // previously, and now less the view's offset
+      for (std::size_t k = 0; k < rows_[i].size(); ++k) {
+        const double previous = -rows_[i][k].by[6];
+        seen.col(static_cast<Eigen::Index>(k)) << previous,
+            rows_[i][k].residual + brightness_[i][0] * previous;
+      }
+      if (seen.cols() == 0) continue;
+      seen.colwise() -= seen.rowwise().mean().eval();
+      shared += (seen.row(0) * seen.row(1)).sum();
+      of_previous += seen.row(0).square().sum();
+      of_now += seen.row(1).square().sum();
+    }
+    return shared / std::sqrt(of_previous * of_now);
   }
 
   /// Fills rows_[i].

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <stdexcept>
 #include <tuple>
@@ -319,6 +320,22 @@ TEST(Motion, NeedsARigThatIsValid) {
                                 images_of(frame(1)));
               }),
               HasSubstr("The rig: cam1: fx is -1"));
+}
+
+TEST(Motion, IsNotInventedBetweenFramesThatHaveNothingInCommon) {
+  for (const double blur : {0.0, 1.0, 2.0, 4.0}) {
+    std::vector<cv::Mat> images;
+    for (int seed = 1; seed <= 4; ++seed) {
+      cv::Mat noise(size, size, CV_8UC1);
+      cv::RNG(seed).fill(noise, cv::RNG::UNIFORM, 0, 256);
+      if (blur > 0) cv::GaussianBlur(noise, noise, {}, blur);
+      images.push_back(noise);
+    }
+    EXPECT_FALSE(estimate_motion(frame(0).rig, {images[0], images[1]}, true_planes(frame(0)),
+                                 {images[2], images[3]})
+                     .has_value())
+        << blur;
+  }
 }
 
 TEST(Motion, IsNotInventedWhereNothingShowsIt) {
