@@ -31,8 +31,9 @@ cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
 /// Of a file, as read_image() reads it.
 cv::Mat read_grey_levels(const std::filesystem::path& path);
 
-/// Reads a mask, CV_8UC1: 255 where the grey image of a file is above 0, 0 = ignore the pixel.
-/// Throws Error as read_image() does.
+/// Reads a mask, CV_8UC1: 255 where a channel of a file is above 0, 0 = ignore the pixel. Of a
+/// JPEG, whose compression makes other numbers of zeros, 255 where one is at least 128. Error as
+/// read_image() does.
 cv::Mat read_mask(const std::filesystem::path& path);
 
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm, .exr (one channel, R G B

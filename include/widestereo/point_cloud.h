@@ -29,7 +29,9 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
                             const cv::Mat& image, const cv::Mat& confidence,
                             const Eigen::Isometry3d& world_from_camera);
 
-/// Writes a binary little-endian PLY: x y z nx ny nz red green blue confidence. Throws Error.
-void write_ply(const std::filesystem::path& path, const PointCloud& cloud);
+/// Writes a binary little-endian PLY: x y z nx ny nz red green blue confidence. A comment has the
+/// origin of the cloud's frame in that of the poses, where that is not 0. Throws Error.
+void write_ply(const std::filesystem::path& path, const PointCloud& cloud,
+               const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
 
 }  // namespace widestereo

@@ -66,6 +66,8 @@ bool is_masked(const View& view, const Eigen::Vector2d& position);
 /// Throws Error unless an image or map has the size that the view is calibrated for. `name` (a
 /// file, say) begins the message.
 void require_calibrated_size(const cv::Mat& map, const View& view, const std::string& name);
+/// Likewise of a mask, which must change if they differ.
+void require_mask_size(const cv::Mat& mask, const View& view, const std::string& name);
 
 /// Throws Error unless every camera is valid, every pose (the IMU's, too) is rigid and finite,
 /// masks fit and no two views share a centre. `name` (a file, say) begins the message.

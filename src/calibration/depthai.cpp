@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibration/yaml_camera.h"
+#include "text/number.h"
 
 namespace widestereo::calibration {
 namespace {
@@ -27,7 +28,8 @@ struct SocketCamera {
 
 constexpr const char* cameras_key = "cameraData";
 constexpr const char* link_key = "toCameraSocket";
-constexpr double metres_of_a_centimetre = 0.01;
+/// Of dai::LengthUnit, by its number; those after are an application's own.
+constexpr double metres_of_units[] = {1, 0.01, 0.001, 0.0254, 0.3048};
 
 /// CAM_A is 0; negative: none.
 int socket_of(double number) {
@@ -40,11 +42,18 @@ Link read_link(const Document& document, const std::string& name, const YAML::No
   Link link;
   link.socket = socket_of(keys.number(link_key));
   if (link.socket < 0) return link;
-  const YamlCamera centimetres(document, name + ": translation", node["translation"]);
-  const Eigen::Vector3d translation(centimetres.number("x"), centimetres.number("y"),
-                                    centimetres.number("z"));
+  constexpr double centimetres = 1;
+  const double unit = keys.has("lengthUnit") ? keys.number("lengthUnit") : centimetres;
+  std::size_t known = 0;
+  while (known < std::size(metres_of_units) && unit != static_cast<double>(known)) ++known;
+  if (known == std::size(metres_of_units)) {
+    document.fail(name + ": The lengthUnit is " + text_of(unit) +
+                  "; metres (0) to feet (4) are known.");
+  }
+  const YamlCamera of_unit(document, name + ": translation", node["translation"]);
+  const Eigen::Vector3d translation(of_unit.number("x"), of_unit.number("y"), of_unit.number("z"));
   link.from_this = rigid(document, name + ": rotationMatrix", keys.matrix("rotationMatrix"),
-                         metres_of_a_centimetre * translation);
+                         metres_of_units[known] * translation);
   return link;
 }
 
@@ -55,12 +64,10 @@ Camera read_camera(const Document& document, const std::string& name, const Yaml
   Camera camera;
   if (type == perspective) {
     camera = rational_camera(document, name + ": The distortionCoeff", coefficients);
-  } else if (type == fisheye && coefficients.size() >= 4) {
-    set_fisheye(camera, coefficients);
+  } else if (type == fisheye) {
+    set_fisheye(camera, keys.numbers("distortionCoeff", 4));
   } else {
-    document.fail(name +
-                  ": The cameraType is none of 0 (perspective) and 1 (fisheye), with the "
-                  "coefficients of one.");
+    document.fail(name + ": The cameraType is none of 0 (perspective) and 1 (fisheye).");
   }
   set_matrix(camera, document, name + ": The intrinsicMatrix", keys.matrix("intrinsicMatrix"));
   camera.width = keys.side("width");

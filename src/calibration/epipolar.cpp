@@ -20,6 +20,9 @@ namespace {
 constexpr double ratio = 0.8;
 constexpr std::size_t fewest_matches = 8;
 constexpr double at_epipole = 1e-6;  // radians
+/// SIFT looks for features in an image of twice the size, and takes pixel 2 x of it for pixel x,
+/// whose middle lies a quarter of a pixel farther.
+constexpr float sift_offset = 0.25f;
 
 struct Features {
   std::vector<cv::KeyPoint> points;
@@ -32,6 +35,9 @@ Features detect(const cv::Mat& image, const std::string& name) {
   cv::createCLAHE(3, {8, 8})->apply(grey, grey);
   Features features;
   cv::SIFT::create(6000)->detectAndCompute(grey, {}, features.points, features.descriptors);
+  for (cv::KeyPoint& point : features.points) {
+    point.pt -= cv::Point2f(sift_offset, sift_offset);
+  }
   for (int i = 0; i < features.descriptors.rows; ++i) {
     cv::Mat row = features.descriptors.row(i);
     row /= cv::norm(row, cv::NORM_L1) + 1e-9;

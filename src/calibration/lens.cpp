@@ -64,6 +64,17 @@ cv::Mat brightest_of(const Camera& camera, const std::vector<cv::Mat>& images) {
 
 }  // namespace
 
+bool may_show_rim(const Camera& camera) {
+  const PreparedCamera prepared(camera);
+  const double right = camera.width - 1, bottom = camera.height - 1;
+  const Eigen::Vector2d corners[] = {{0, 0}, {right, 0}, {0, bottom}, {right, bottom}};
+  return std::any_of(std::begin(corners), std::end(corners), [&](const Eigen::Vector2d& corner) {
+    Eigen::Vector3d ray;
+    return !prepared.unproject(corner, ray) ||
+           std::atan2(ray.head<2>().norm(), ray.z()) >= smallest_rim;
+  });
+}
+
 std::optional<LensRim> find_lens_rim(const Camera& camera, const std::vector<cv::Mat>& images) {
   std::vector<std::vector<float>> rings = rings_of(camera, brightest_of(camera, images));
   if (rings.size() < fewest_dark_rings) return std::nullopt;

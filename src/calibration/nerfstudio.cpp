@@ -27,6 +27,9 @@ constexpr const char* camera_keys[] = {
     "camera_model",   "is_fisheye",    "w", "h", "cx", "cy", "fl_x", "fl_y", "camera_angle_x",
     "camera_angle_y", coefficient_list};
 constexpr const char* aria_name = "FISHEYE624";
+/// By these Instant NGP chooses other lenses, which have no such focal length.
+constexpr const char* lens_keys[] = {"ftheta_p0", "ftheta_p1", "ftheta_p2",       "ftheta_p3",
+                                     "ftheta_p4", "latlong",   "equirectangular", "orthographic"};
 
 /// nerfstudio's model of this name has k3, which COLMAP's has not.
 const ColmapModel& radial_tangential() {
@@ -117,6 +120,12 @@ class Reader {
   }
 
   std::string model_name(const Json& frame, std::size_t i) const {
+    for (const char* key : lens_keys) {
+      const Json* value = find(frame, key);
+      if (value == nullptr || *value == false || *value == 0) continue;
+      fail(i, "The lens that \"" + std::string(key) +
+                  "\" stands for is not supported; give a camera_model instead.");
+    }
     const Json* fisheye = find(frame, "is_fisheye");
     std::string name = fisheye != nullptr && *fisheye == true ? "OPENCV_FISHEYE" : "OPENCV";
     if (const Json* given = find(frame, "camera_model")) {

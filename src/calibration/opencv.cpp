@@ -51,13 +51,16 @@ const std::string& parsable(const Document& document) {
   return document.text;
 }
 
-/// A FileStorage whose keys go by several names.
+/// A FileStorage whose keys go by several names; numbers in them may begin with 0 or 1.
 class Storage {
  public:
   explicit Storage(const Document& document)
       : document_(document),
         file_(parsable(document), cv::FileStorage::READ | cv::FileStorage::MEMORY) {
     if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
+    for (const char* key : {"K0", "M0", "cameraMatrix0", "camera_matrix_0"}) {
+      begins_with_0_ = begins_with_0_ || !node_of(key).empty();
+    }
   }
 
   /// Those of the top level and of the maps there.
@@ -74,17 +77,19 @@ class Storage {
   /// The first of the keys that holds a numeric matrix (or a list, or a number), as double; empty
   /// if none does.
   cv::Mat matrix(Keys keys) const {
-    for (const char* key : keys) {
+    for (const char* const named : keys) {
+      std::string key = named;
+      if (begins_with_0_ && (key.back() == '1' || key.back() == '2')) --key.back();
       const cv::FileNode node = node_of(key);
       cv::Mat value = numbers(node);
       if (node.isMap()) {
-        require_small(node, key);
+        require_small(node, key.c_str());
         node >> value;
       }
       if (value.empty() || value.channels() != 1) continue;
       value.convertTo(value, CV_64F);
       if (!cv::checkRange(value)) {
-        document_.fail(std::string("The matrix ") + key + " holds a number that is not finite.");
+        document_.fail("The matrix " + key + " holds a number that is not finite.");
       }
       return value.reshape(1, value.rows);
     }
@@ -117,7 +122,7 @@ class Storage {
  private:
   /// At the top level, or in the one map there that has the key: of several it would be of one
   /// camera among others.
-  cv::FileNode node_of(const char* key) const {
+  cv::FileNode node_of(const std::string& key) const {
     const cv::FileNode top = file_[key];
     cv::FileNode found;
     if (!top.empty()) return top;
@@ -167,6 +172,7 @@ class Storage {
 
   const Document& document_;
   cv::FileStorage file_;
+  bool begins_with_0_ = false;
 };
 
 /// One camera's name and keys.
@@ -284,6 +290,19 @@ Camera read_camera(const Document& document, const Storage& storage, const Camer
   return camera;
 }
 
+/// A file without a size may be for images of another one.
+void require_centre(const Document& document, const View& view) {
+  constexpr double least = 0.3;  // of the side; for images of half or twice the size 0.25 or 1
+  const Camera& c = view.camera;
+  const auto is_near_middle = [](double centre, int side) {
+    return centre > least * side && centre < (1 - least) * side;
+  };
+  if (is_near_middle(c.cx, c.width) && is_near_middle(c.cy, c.height)) return;
+  document.fail("It has no image size, and the principal point of " + view.name +
+                " is not near the middle of the given images of " + size_text(c.width, c.height) +
+                " pixels; add image_width and image_height, those of the images it was made with.");
+}
+
 /// A key of ours, one number for each camera.
 void limit_fields_of_view(Rig& rig, const Document& document, const Storage& storage) {
   const cv::Mat degrees = storage.matrix({max_theta_key});
@@ -385,7 +404,8 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     if (!in_file.empty() && !image_size.empty() && in_file != image_size) {
       document.fail("It is for images of " + size_text(in_file.width, in_file.height) +
                     " pixels, the given ones have " +
-                    size_text(image_size.width, image_size.height) + ".");
+                    size_text(image_size.width, image_size.height) +
+                    "; `calibration convert --scale` makes a calibration for reduced images.");
     }
     require_known_xi(document, storage);
     Rig rig;
@@ -399,6 +419,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         document.fail("It has the second camera's xi without its matrix (K2); add it.");
       }
       rig.views.pop_back();
+      if (in_file.empty()) require_centre(document, rig.views[0]);
       limit_fields_of_view(rig, document, storage);
       return rig;
     }
@@ -407,6 +428,9 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     if ((rig.views[0].camera.model == CameraModel::mei) !=
         (rig.views[1].camera.model == CameraModel::mei)) {
       document.fail("It has a xi of one camera alone; add the other's (xi1, xi2), or remove it.");
+    }
+    if (in_file.empty()) {
+      for (const View& view : rig.views) require_centre(document, view);
     }
     rig.views[1].world_from_camera = second_from_first(storage, document).inverse();
     limit_fields_of_view(rig, document, storage);

@@ -35,9 +35,11 @@ std::optional<OpenCvForm> form_of(const Camera& c) {
       return OpenCvForm{{c.k1, c.k2, c.p1, c.p2}, c.xi};
     case CameraModel::pinhole:
     case CameraModel::pinhole_radtan:
+      if (c.skew != 0) return std::nullopt;  // which cv::projectPoints() ignores
       // Five, as four would be cv::fisheye's.
       return OpenCvForm{{c.k1, c.k2, c.p1, c.p2, c.k3}};
     case CameraModel::pinhole_rational:
+      if (c.skew != 0) return std::nullopt;
       return OpenCvForm{{c.k1, c.k2, c.p1, c.p2, c.k3, c.k4, c.k5, c.k6, c.s1, c.s2, c.s3, c.s4}};
     default:
       return std::nullopt;

@@ -118,6 +118,10 @@ class SfmModel::Implementation {
       cameras_ = cameras_of(cameras_file_);
       images_ = images_of(images_file_);
     }
+    if (images_.empty()) {
+      throw Error(images_file_.string() +
+                  " has no image; give a model in which images are registered.");
+    }
     name_images();
     read_points();
   }
@@ -143,9 +147,8 @@ class SfmModel::Implementation {
     }
     if (longest > 0) return found;
     throw Error(images_file_.string() + " has no image whose name is the end of " + file.string() +
-                " among its " + std::to_string(names_.size()) +
-                (names_.empty() ? "" : " (the first is " + names_.front() + ")") +
-                "; give images that it has, in their folder.");
+                " among its " + std::to_string(names_.size()) + " (the first is " + names_.front() +
+                "); give images that it has, in their folder.");
   }
 
   CalibratedImages calibrated(const std::vector<std::size_t>& images) const {
@@ -164,7 +167,7 @@ class SfmModel::Implementation {
       view.world_from_camera = image.camera_from_world.inverse();
       if (image.mask.empty()) continue;
       view.mask = read_mask(image.mask);
-      require_calibrated_size(view.mask, view, image.mask.string());
+      require_mask_size(view.mask, view, image.mask.string());
     }
     validate(calibrated.rig, path_.string());
     calibrated.distances = distances(images);

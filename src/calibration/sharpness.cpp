@@ -204,7 +204,8 @@ cv::Mat blurred(const cv::Mat& image, double blur) {
   }
   if (blur == 0) return image;
   cv::Mat result;
-  cv::GaussianBlur(image, result, {}, blur, blur, cv::BORDER_REPLICATE);
+  // Not from what lies beside a part of a larger image.
+  cv::GaussianBlur(image, result, {}, blur, blur, cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
   return result;
 }
 

@@ -50,8 +50,17 @@ void require_calibrated_size(const cv::Mat& map, const View& view, const std::st
               view.name + " is for " + size_text(camera.width, camera.height) +
               "; both must have the same size" +
               (is_reduced
-                   ? "; `calibration convert --scale` makes a calibration for reduced images."
+                   ? "; `calibration convert --scale` makes a calibration for reduced images, but "
+                     "not of a COLMAP model, which needs the original ones (and --max-image-size)."
                    : "."));
+}
+
+void require_mask_size(const cv::Mat& mask, const View& view, const std::string& name) {
+  const cv::Size image(view.camera.width, view.camera.height);
+  if (mask.size() == image) return;
+  throw Error(name + " is " + size_text(mask.cols, mask.rows) + " pixels, but the images of " +
+              view.name + " have " + size_text(image.width, image.height) +
+              "; give a mask of that size.");
 }
 
 }  // namespace widestereo

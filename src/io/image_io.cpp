@@ -58,6 +58,8 @@ bool begins_with(std::span<const uchar> bytes, std::initializer_list<uchar> head
   return bytes.size() >= head.size() && std::equal(head.begin(), head.end(), bytes.begin());
 }
 
+bool is_jpeg(std::span<const uchar> bytes) { return begins_with(bytes, {0xff, 0xd8, 0xff}); }
+
 /// Big-endian, of 2 or 4 bytes.
 std::size_t number_at(std::span<const uchar> bytes, std::size_t position, std::size_t size) {
   std::size_t number = 0;
@@ -104,7 +106,7 @@ bool is_whole_jpeg(std::span<const uchar> bytes) {
 /// of it: cameras append data.
 bool is_truncated(std::span<const uchar> bytes) {
   if (begins_with(bytes, {0x89, 'P', 'N', 'G'})) return !is_whole_png(bytes);
-  if (begins_with(bytes, {0xff, 0xd8, 0xff})) return !is_whole_jpeg(bytes);
+  if (is_jpeg(bytes)) return !is_whole_jpeg(bytes);
   return false;
 }
 
@@ -280,9 +282,10 @@ cv::Mat read_mask(const std::filesystem::path& path) {
                   "are to be ignored.");
     }
   }
-  cv::Mat mask = channels[0] != 0;
+  const int most_ignored = is_jpeg(read_bytes(path)) ? 127 : 0;  // compression changes zeros
+  cv::Mat mask = channels[0] > most_ignored;
   for (std::size_t i = 1; i < std::min<std::size_t>(channels.size(), 3); ++i) {
-    mask |= channels[i] != 0;
+    mask |= channels[i] > most_ignored;
   }
   return mask;
 }

@@ -59,7 +59,7 @@ cv::Mat with_strip(const cv::Mat& picture, int height) {
   require_type(picture, CV_8UC3, "The picture");
   cv::Mat result;
   cv::copyMakeBorder(picture, result, 0, height, 0, std::max(0, least_width - picture.cols),
-                     cv::BORDER_CONSTANT, paper_colour);
+                     cv::BORDER_CONSTANT | cv::BORDER_ISOLATED, paper_colour);
   return result;
 }
 

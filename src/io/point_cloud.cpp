@@ -9,6 +9,7 @@
 #include "geometry/validation.h"
 #include "io/bgr8.h"
 #include "io/point_cloud.h"
+#include "text/formatted.h"
 #include "text/number.h"
 #include "widestereo/files.h"
 
@@ -75,7 +76,8 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
   return cloud;
 }
 
-void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
+void write_ply(const std::filesystem::path& path, const PointCloud& cloud,
+               const Eigen::Vector3d& origin) {
   std::vector<char> bytes;
   bytes.reserve(cloud.size() * 31);
   for (const CloudPoint& point : cloud) {
@@ -88,8 +90,12 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud) {
   }
   write_file(path, [&](std::ostream& stream) {
     stream << "ply\nformat binary_little_endian 1.0\n"
-           << "comment world frame and unit of the cameras' poses\n"
-           << "element vertex " << text_of(cloud.size()) << "\n"
+           << "comment world frame and unit of the cameras' poses\n";
+    if (!origin.isZero(0)) {
+      stream << formatted("comment origin, to be added: %.12g %.12g %.12g\n", origin.x(),
+                          origin.y(), origin.z());
+    }
+    stream << "element vertex " << text_of(cloud.size()) << "\n"
            << "property float x\nproperty float y\nproperty float z\n"
            << "property float nx\nproperty float ny\nproperty float nz\n"
            << "property uchar red\nproperty uchar green\nproperty uchar blue\n"

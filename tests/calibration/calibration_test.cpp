@@ -382,6 +382,25 @@ TEST(OpenCv, TakesTheSizeFromTheImages) {
   EXPECT_NE(error_of(path).find("image size"), std::string::npos);
   EXPECT_EQ(read_calibration(path, {1280, 960}).rig.views[1].camera.height, 960);
   EXPECT_THROW(read_calibration(folder.write("with.yml", opencv_text), {640, 480}), Error);
+  for (const cv::Size of_another_scale : {cv::Size(640, 480), cv::Size(2560, 1920)}) {
+    EXPECT_NE(test::error_of([&] {
+                read_calibration(path, of_another_scale);
+              }).find("not near the middle of the given images"),
+              std::string::npos);
+  }
+}
+
+TEST(OpenCv, MayCountCamerasFromZero) {
+  const TemporaryFolder folder;
+  std::string text = opencv_text;
+  for (const char* letter : {"K", "D"}) {
+    text = replaced(text, std::string(letter) + "1:", std::string(letter) + "0:");
+    text = replaced(text, std::string(letter) + "2:", std::string(letter) + "1:");
+  }
+  const Rig rig = read_calibration(folder.write("from_zero.yml", text)).rig;
+  const Rig expected = read_calibration(folder.write("stereo.yml", opencv_text)).rig;
+  ASSERT_EQ(rig.views.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(rig.views[i].camera, expected.views[i].camera);
 }
 
 TEST(OpenCv, RefusesSizesThatAreNotWhole) {
@@ -934,6 +953,10 @@ TEST(Writing, NamesTheOtherFormatWhereThatHoldsTheCamera) {
   expect(CameraModel::kannala_brandt, 0.1,
          "with a skew) has no form in Kalibr's format; choose OpenCV's.",
          "with skew) has no form in Basalt's format; choose OpenCV's.");
+  // cv::projectPoints() would ignore it.
+  expect(CameraModel::pinhole_rational, 0.1,
+         "in Kalibr's format; no other that is written has one, so keep the file that it is from.",
+         "in Basalt's format; no other that is written has one, so keep the file that it is from.");
   expect(CameraModel::double_sphere, 0.1,
          "in Kalibr's format; no other that is written has one, so keep the file that it is from.",
          "in Basalt's format; no other that is written has one, so keep the file that it is from.");

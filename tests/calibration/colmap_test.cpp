@@ -488,6 +488,12 @@ TEST_F(Colmap, MissingPartsAreErrors) {
             std::string::npos)
       << error({"left/c.png"});
   EXPECT_NE(error({"b.png", "b.png"}).find("have the same centre"), std::string::npos);
+  for (const char* no_images : {"", "# Image list\n"}) {
+    write_text(cameras_text, no_images);
+    EXPECT_NE(error().find("images.txt has no image; give a model in which images are registered."),
+              std::string::npos)
+        << error();
+  }
   write_text("7 SIMPLE_RADIAL 1000 800 900 500 400 -0.1\n");
   EXPECT_NE(error().find("cameras.txt has no camera 1, which took left/a b.png"), std::string::npos)
       << error();

@@ -102,6 +102,22 @@ TEST_F(DepthAi, LinksAreFollowedBothWays) {
   EXPECT_FALSE(rig.world_from_imu.has_value());
 }
 
+TEST_F(DepthAi, LengthsMayHaveAUnit) {
+  for (const auto& [unit, metres] : {std::pair("0", 1.0), {"1", 0.01}, {"2", 0.001}}) {
+    const std::string text =
+        R"({"cameraData": [[1, )" +
+        camera("1", "0, 0, 0, 0", "1280",
+               link("2", straight,
+                    R"({"x": -7.5, "y": 0, "z": 0}, "lengthUnit": )" + std::string(unit))) +
+        "], [2, " + camera("1", "0, 0, 0, 0", "1280", nowhere) + "]]}";
+    const Rig rig = read_calibration(folder_.write("calib.json", text)).rig;
+    EXPECT_NEAR(rig.views[1].world_from_camera.translation().x(), 7.5 * metres, 1e-12);
+    std::string own = text;
+    own.replace(own.find("\"lengthUnit\": ") + 14, 1, "5");
+    EXPECT_THAT(error(own), HasSubstr("The lengthUnit is 5"));
+  }
+}
+
 TEST_F(DepthAi, WhatIsWrongIsOneSentence) {
   const std::string good = device();
   EXPECT_EQ(error(good), "");
@@ -116,6 +132,7 @@ TEST_F(DepthAi, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(error(replaced("\"cameraType\": 1", "\"cameraType\": 2")), HasSubstr("cameraType"));
   EXPECT_THAT(error(replaced("0, 0, 0, 0, 0, 0]", "0, 0, 0, 0, 0.1, 0]")),
               HasSubstr("CALIB_TILTED_MODEL"));
+  EXPECT_THAT(error(replaced("0.03, 0.04, 0,", "0.03, 0.04, 0.5,")), HasSubstr("distortionCoeff"));
   EXPECT_THAT(error(replaced("[[570.5, 0.0, 640.25]", "[[570.5, 0.0]")), HasSubstr("3x3 matrix"));
   EXPECT_THAT(error(replaced("[[570.5, 0.0, 640.25], [0.0, 571.5, 400.75], [0.0, 0.0, 1.0]]",
                              "[[570.5, 0.0, 0.0], [0.0, 571.5, 0.0], [640.25, 400.75, 1.0]]")),

@@ -194,6 +194,29 @@ TEST(Epipolar, AFeatureIsMatchedOnce) {
   }
 }
 
+/// What is found at x must be found at the same place from the other end once the image is turned
+/// upside down.
+TEST(Epipolar, FeaturesLieWherePixelsDo) {
+  cv::Mat noise(256, 320, CV_8UC1);
+  cv::RNG(4).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(noise, noise, {}, 2);
+  cv::Mat turned;
+  cv::rotate(noise, turned, cv::ROTATE_180);
+  const std::vector<PixelMatch> matches = match_features(noise, turned);
+  ASSERT_GT(matches.size(), 100U);
+  std::vector<double> x, y;
+  for (const PixelMatch& match : matches) {
+    x.push_back(match.first.x() + match.second.x());
+    y.push_back(match.first.y() + match.second.y());
+  }
+  const auto median = [](std::vector<double>& values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+  };
+  EXPECT_NEAR(median(x), 319, 0.03);
+  EXPECT_NEAR(median(y), 255, 0.03);
+}
+
 TEST(Epipolar, NeedsMatches) {
   const Rig rig = rig_with_rotation_error(0);
   EXPECT_THROW(check_epipolar(rig.views[0], rig.views[1], {}), Error);

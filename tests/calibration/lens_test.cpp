@@ -105,6 +105,17 @@ TEST(LensRim, IsNotLookedForFarInside) {
   EXPECT_GT(rim->usable / degree, 0.91 * 95);
 }
 
+TEST(LensRim, IsNotLookedForInImagesThatEndBefore) {
+  EXPECT_TRUE(may_show_rim(fisheye()));
+  Camera pinhole;
+  pinhole.width = pinhole.height = 320;
+  pinhole.cx = pinhole.cy = 159.5;
+  for (const auto& [corner, may] : {std::pair(59.0, false), {61.0, true}}) {
+    pinhole.fx = pinhole.fy = 159.5 * std::sqrt(2) / std::tan(corner * degree);
+    EXPECT_EQ(may_show_rim(pinhole), may);
+  }
+}
+
 TEST(LensRim, IsNoneWhereNothingShowsIt) {
   const Camera camera = fisheye();
   EXPECT_FALSE(find_lens_rim(camera, {photograph(camera, [](double) { return 1; })}));

@@ -73,6 +73,14 @@ TEST_F(Nerfstudio, InstantNgpsWordsAreKnown) {
   EXPECT_EQ(seen.camera.model, CameraModel::kannala_brandt);
   EXPECT_NEAR(seen.camera.fx, 50, 1e-9);
   EXPECT_NEAR(seen.camera.fy, 50, 1e-9);
+  // Its other lenses have such an angle in their files, too.
+  const std::string pinhole = R"("camera_angle_x": 1.5, "w": 100, "h": 80, )";
+  for (const char* lens : {R"("ftheta_p1": 0.001)", R"("latlong": true)"}) {
+    EXPECT_NE(error(file(pinhole + lens, frame("a.png"))).find("is not supported; give a camera_"),
+              std::string::npos)
+        << lens;
+  }
+  EXPECT_EQ(error(file(pinhole + R"("latlong": false)", frame("a.png"))), "");
 }
 
 // As exported from Project Aria's recordings.

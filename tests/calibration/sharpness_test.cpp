@@ -10,6 +10,7 @@
 
 #include "data_folder.h"
 #include "error_of.h"
+#include "same_bits.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -224,6 +225,11 @@ TEST(Sharpness, BlurOfNothingIsTheImage) {
   cv::Mat difference;
   cv::absdiff(blurred(image, 1), image, difference);
   EXPECT_GT(cv::mean(difference)[0], 3);
+}
+
+TEST(Sharpness, BlurOfAPartOfAnImageKnowsNothingOfTheRest) {
+  const cv::Mat half = grey_levels(scene()).colRange(0, 100);
+  EXPECT_TRUE(test::same_bits(blurred(half, 1.5), blurred(half.clone(), 1.5)));
 }
 
 TEST(Sharpness, OfRenderedPairs) {

@@ -108,8 +108,9 @@ TEST(Maps, HaveTheCalibratedSize) {
                   " pixels, but the calibration of cam1 is for 64x48; both must have the same "
                   "size.");
   }
-  EXPECT_TRUE(error(32, 24).ends_with(
-      "the same size; `calibration convert --scale` makes a calibration for reduced images."))
+  EXPECT_NE(error(32, 24).find("the same size; `calibration convert --scale` makes a calibration "
+                               "for reduced images"),
+            std::string::npos)
       << error(32, 24);
 }
 

@@ -15,6 +15,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "bytes_of.h"
 #include "comma_locale.h"
@@ -251,6 +252,20 @@ TEST(Images, MasksAreAllThatIsAboveZero) {
   // How opaque a pixel is says nothing.
   write_image(folder / "opaque.png", cv::Mat(2, 3, CV_8UC4, cv::Scalar(0, 0, 0, 255)));
   EXPECT_EQ(cv::countNonZero(read_mask(folder / "opaque.png")), 0);
+}
+
+TEST(Images, MasksOfJpegsAreCutAtHalf) {
+  const TemporaryFolder folder;
+  cv::Mat disc = cv::Mat::zeros(64, 64, CV_8UC1);
+  cv::circle(disc, {32, 32}, 20, 255, cv::FILLED);
+  write_image(folder / "mask.jpg", disc);
+  cv::Mat beside;
+  cv::dilate(disc, beside, cv::Mat::ones(5, 5, CV_8UC1));
+  const cv::Mat ringing = read_image(folder / "mask.jpg");
+  ASSERT_GT(cv::countNonZero(ringing & (beside == 0)), 0);
+  const cv::Mat mask = read_mask(folder / "mask.jpg");
+  EXPECT_EQ(cv::countNonZero(mask & (beside == 0)), 0);
+  EXPECT_NEAR(cv::countNonZero(mask), cv::countNonZero(disc), 10);
 }
 
 TEST(BadFiles, AreNamed) {

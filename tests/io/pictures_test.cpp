@@ -139,6 +139,13 @@ TEST(Pictures, LegendsAddAStripBelowAndKeepThePicture) {
   }
 }
 
+TEST(Pictures, LegendsOfAPartOfAPictureShowNothingOfTheRest) {
+  cv::Mat picture(300, 200, CV_8UC3);
+  cv::RNG(3).fill(picture, cv::RNG::UNIFORM, 0, 256);
+  const cv::Mat part = picture.rowRange(0, 100);
+  EXPECT_TRUE(same_bits(with_scalar_legend(part, 0, 1), with_scalar_legend(part.clone(), 0, 1)));
+}
+
 TEST(Pictures, DistanceLegendNamesTheUnit) {
   const cv::Mat picture(100, 400, CV_8UC3, cv::Scalar(1, 2, 3));
   const cv::Mat metres = with_distance_legend(picture, {1, 5});
