@@ -76,16 +76,19 @@ std::string mistake(const ws::View& first, const ws::View& second,
   return words;
 }
 
+bool will_do(const ws::EpipolarReport& report) {
+  return !lie_behind(report) && report.median_pixels < usable;
+}
+
 std::string verdict_of(const ws::EpipolarReport& report, const ws::View& first,
                        const ws::View& second, const std::vector<ws::PixelMatch>& matches,
                        bool has_poses) {
-  if (!lie_behind(report)) {
-    if (report.median_pixels < 0.5) return "good";
-    if (report.median_pixels < usable) return "usable, expect errors where texture is fine";
-    if (report.median_pixels < of_these_cameras) {
-      return has_poses ? "too inaccurate for stereo: calibrate again, or get better poses"
-                       : "too inaccurate for stereo: calibrate again";
-    }
+  if (will_do(report)) {
+    return report.median_pixels < 0.5 ? "good" : "usable, expect errors where texture is fine";
+  }
+  if (!lie_behind(report) && report.median_pixels < of_these_cameras) {
+    return has_poses ? "too inaccurate for stereo: calibrate again, or get better poses"
+                     : "too inaccurate for stereo: calibrate again";
   }
   const std::string remedy = mistake(first, second, matches);
   if (!remedy.empty()) return "wrong way round: " + remedy;
@@ -108,7 +111,8 @@ std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
          ", 95 % below " + text(report.farthest);
 }
 
-void check(const CheckArguments& arguments) {
+/// Whether the calibration will do for stereo.
+bool check(const CheckArguments& arguments) {
   require_different_images({arguments.left, arguments.right});
   const cv::Mat left = arguments.white_level.read(arguments.left);
   const cv::Mat right = arguments.white_level.read(arguments.right);
@@ -144,7 +148,7 @@ void check(const CheckArguments& arguments) {
                                          {"verdict", verdict}})
                      .dump(2)
               << "\n";
-    return;
+    return will_do(r);
   }
   std::printf(
       "%d matched features\n"
@@ -153,22 +157,34 @@ void check(const CheckArguments& arguments) {
       "calibration: %s\n",
       r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
       distances_of(r, images.in_metres ? " m" : "").c_str(), verdict.c_str());
-  if (!sharpness) return;
-  std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
-              (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),
-              sharpness->blur);
+  constexpr double longest_baseline = 5;  // metres, of what is usually mounted
+  const double length = baseline(first, second);
+  if (images.in_metres && !arguments.poses.given() && length > longest_baseline) {
+    std::printf("baseline: %.4g m; calibrations are in metres, is this one?\n", length);
+  }
+  if (sharpness) {
+    std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
+                (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),
+                sharpness->blur);
+  }
+  return will_do(r);
 }
 
 }  // namespace
 
 void add_calibration_check_command(CLI::App& group) {
   CLI::App* command = group.add_subcommand(
-      "check", "Measure the epipolar error of features matched between two images");
+      "check",
+      "Measure the epipolar error of features matched between two images; ends with 0 where the "
+      "calibration will do for stereo, with 2 where it will not");
   auto arguments = std::make_shared<CheckArguments>();
   command->add_option("left", arguments->left, "Image of the first camera")->required();
   command->add_option("right", arguments->right, "Image of the second camera")->required();
   add_image_options(*command, arguments->rig, arguments->poses);
   arguments->white_level.add_to(*command);
   command->add_flag("--json", arguments->as_json, "Print JSON");
-  command->callback([arguments] { check(*arguments); });
+  command->callback([arguments] {
+    constexpr int will_not_do = 2;  // 1 is that of errors
+    if (!check(*arguments)) throw CLI::RuntimeError(will_not_do);
+  });
 }

@@ -107,8 +107,9 @@ void run_depth(const DepthArguments& arguments) {
   if (!arguments.rig.masks.empty()) contents.origin["masks"] = arguments.rig.masks;
   report(write_result_folder(arguments.output, contents, arguments.format), arguments.output,
          arguments.as_json);
-  if (!arguments.as_json)
-    report_little_accepted(accepted_share(run.result.views), "the order of the images");
+  if (arguments.as_json) return;
+  report_little_accepted(accepted_share(run.result.views), "the order of the images");
+  report_nearest(run.result.views, options.min_distance);
 }
 
 }  // namespace

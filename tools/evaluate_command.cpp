@@ -29,6 +29,7 @@ struct EvaluateArguments {
   std::optional<int> view_of_map, source_of_map;  ///< as given
   int view = 0, source = 1;
   double png_scale = FolderFormat::usual_png_scale;
+  double truth_png_scale = FolderFormat::usual_png_scale;
   double far_distance = 0;  ///< metres, 0: do not score what has no ground truth
   std::string error_map;
   bool as_json = false;
@@ -107,7 +108,8 @@ void run_evaluate(EvaluateArguments a) {
                         a.truth_normals, a.image, a.field_of_view, a.calibration});
   }
   ws::GroundTruth truth;
-  truth.distance = read_map(a.truth, 1, "a distance map");
+  require_scaled_png("--truth-png-scale", a.truth_png_scale, a.truth);
+  truth.distance = read_map(a.truth, 1, "a distance map", a.truth_png_scale);
   if (!a.valid.empty()) truth.valid = read_labels(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = read_map(a.truth_normals, 3, "a normal map");
@@ -121,6 +123,7 @@ void run_evaluate(EvaluateArguments a) {
     }
     truth.field_of_view = read_labels(a.field_of_view);
   }
+  require_scaled_png("--png-scale", a.png_scale, a.prediction);
   const cv::Mat prediction = read_map(a.prediction, 1, "a distance map", a.png_scale);
   require_same_size(prediction, a.prediction, truth.distance, a.truth,
                     "score maps that were matched at that size, without --max-image-size");
@@ -177,7 +180,7 @@ void add_evaluate_command(CLI::App& app) {
   auto a = std::make_shared<EvaluateArguments>();
   command->add_option("prediction", a->prediction, "Distance map: .tiff, .exr, .pfm or 16-bit .png")
       ->required();
-  add_png_scale_of_input(*command, a->png_scale);
+  add_png_scale_of_input(*command, "--png-scale", a->png_scale);
   command->add_option("--normals", a->normals, "Normal map to score as well");
   command->add_option(
       "--confidence", a->confidence,
@@ -188,6 +191,7 @@ void add_evaluate_command(CLI::App& app) {
       "Folder with depthN.tiff, validN.png, occN.png or occN_M.png, normalN.tiff, camN.png, "
       "fovN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
+  add_png_scale_of_input(*command, "--truth-png-scale", a->truth_png_scale);
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");
   command->add_option("--occlusion", a->occlusion,
                       "255 visible in the source, 0 occluded, 128 outside");

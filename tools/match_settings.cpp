@@ -147,6 +147,8 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
         ->excludes(no_warm_start);
   }
   add("--best-sources", &Options::best_sources, "Cost = mean over this many best source views");
+  add("--max-gain", &Options::max_gain,
+      "Largest factor by which images of little contrast, as dark ones, are stretched; 1 = none");
   add("--min-texture", &Options::min_texture,
       "Smallest standard deviation of a patch, grey levels of 255");
   add("--min-visible", &Options::min_visible, "Share of a patch that must be seen in the source");

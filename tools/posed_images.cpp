@@ -199,10 +199,12 @@ std::vector<bool> PosedImageSettings::apply_masks(PosedImages& posed) const {
 void PosedImageSettings::leave_out_dark_rims(PosedImages& posed,
                                              const std::vector<bool>& masked) const {
   std::vector<bool> done = masked;
+  ProgressBar bar("Looking for dark rims");
   for (std::size_t first = 0; first < posed.views.size(); ++first) {
     if (done[first]) continue;
     const ws::Camera camera = posed.views[first].camera;
     if (!rig.looks_for_rim_of(camera)) continue;
+    bar.show(static_cast<double>(first) / static_cast<double>(posed.views.size()));
     Images of_camera;
     for (std::size_t i = first; i < posed.views.size(); ++i) {
       if (!masked[i] && posed.views[i].camera == camera) of_camera.push_back(i);

@@ -21,6 +21,7 @@
 #include "result_folder.h"
 #include "result_folders.h"
 #include "say.h"
+#include "text/formatted.h"
 #include "text/json_text.h"
 #include "widestereo/error.h"
 #include "widestereo/fusion.h"
@@ -94,6 +95,36 @@ std::vector<Images> groups_of(const PosedImages& images, const ReconstructArgume
   return groups;
 }
 
+std::string name_of(const Images& group, const PosedImages& images) {
+  return images.views[group.front()].name + " and " + std::to_string(group.size() - 1) + " more";
+}
+
+/// The groups but those whose points lie beyond the one end of the range that was given.
+std::vector<Images> within_range(const std::vector<Images>& groups, const PosedImages& images,
+                                 const MatchSettings& settings) {
+  if (settings.min_distance.has_value() == settings.max_distance.has_value()) return groups;
+  std::vector<Images> within;
+  std::vector<std::string> left_out;
+  for (const Images& group : groups) {
+    const auto points = images.distances(group);
+    if (!points || is_alone(group) ||
+        settings.min_distance.value_or(points->nearest) <
+            settings.max_distance.value_or(points->farthest)) {
+      within.push_back(group);
+      continue;
+    }
+    left_out.push_back(name_of(group, images) +
+                       ws::formatted(" have points from %g to %g, all beyond ", points->nearest,
+                                     points->farthest) +
+                       (settings.min_distance ? "--min-distance" : "--max-distance"));
+  }
+  if (alone_in(within) == within.size()) {
+    throw ws::Error(left_out.front() + ", and so have all others; give another distance.");
+  }
+  for (const std::string& group : left_out) say(group + ", and are left out.");
+  return within;
+}
+
 /// Of each group: its images' points say how far the scene reaches where the settings do not.
 std::vector<ws::Options> options_of(const std::vector<Images>& groups, const PosedImages& images,
                                     const ReconstructArguments& arguments) {
@@ -135,7 +166,7 @@ class Reconstruction {
   explicit Reconstruction(const ReconstructArguments& arguments)
       : arguments_(arguments),
         images_(arguments.images.read(arguments.settings)),
-        groups_(groups_of(images_, arguments)),
+        groups_(within_range(groups_of(images_, arguments), images_, arguments.settings)),
         options_(options_of(groups_, images_, arguments)),
         device_(open_device(arguments.settings)),
         folders_(arguments.output,
@@ -158,8 +189,14 @@ class Reconstruction {
                          [](const Images& a, const Images& b) { return a.size() < b.size(); });
     report_few_sources(options_.front(), largest->size());
     keep_results();
+    std::vector<std::size_t> to_do;
+    for (std::size_t i = 0; i < groups_.size(); ++i) {
+      const bool is_done = std::all_of(groups_[i].begin(), groups_[i].end(),
+                                       [this](std::size_t image) { return is_matched(image); });
+      if (!is_alone(groups_[i]) && !is_done) to_do.push_back(i);
+    }
     ProgressBar bar("Matching on " + device_.info().name);
-    for (std::size_t i = 0; i < groups_.size(); ++i) match(i, bar);
+    for (std::size_t i = 0; i < to_do.size(); ++i) match(to_do[i], bar.part(i, to_do.size()));
     fuse();
   }
 
@@ -189,6 +226,7 @@ class Reconstruction {
       for (const std::size_t image : groups_[i]) {
         const std::string& name = images_.views[image].name;
         folders_.require_usable(name);
+        folders_.require_free(name);
         wanted.emplace(name, std::pair{image, inputs});
       }
     }
@@ -216,12 +254,9 @@ class Reconstruction {
         std::to_string(wanted.size() - alone_in(groups_)) + " images.");
   }
 
-  void match(std::size_t number, ProgressBar& bar) {
+  /// `progress`: empty where nobody sees it.
+  void match(std::size_t number, const ws::Matcher::Progress& progress) {
     const Images& group = groups_[number];
-    const std::size_t count = groups_.size();
-    const bool is_done = std::all_of(group.begin(), group.end(),
-                                     [this](std::size_t image) { return is_matched(image); });
-    if (is_alone(group) || is_done) return;
     ws::Rig rig;
     std::vector<cv::Mat> pixels;
     for (const std::size_t image : group) {
@@ -234,16 +269,21 @@ class Reconstruction {
     report_blank_images(rig, pixels);
     MatchingRun run{.options = options_[number], .device = device_.info(), .result = {}};
     ws::Matcher matcher(device_, rig, run.options);
-    run.result = matcher.match(pixels, bar.part(number, count));
+    try {
+      run.result = matcher.match(pixels, progress);
+    } catch (const ws::NoOverlap&) {
+      say(name_of(group, images_) +
+          " see nothing in common within the range of distances and are left out.");
+      return;
+    }
     require_no_validation_messages(device_);
     report_views_without_overlap(rig, run.result);
     for (std::size_t i = 0; i < group.size(); ++i) {
       if (!is_matched(group[i])) write(number, i, pixels[i], run);
     }
-    if (arguments_.as_json || bar.visible()) return;
-    std::printf("group %zu of %zu: %s and %zu more, %.2f s\n", number + 1, count,
-                images_.views[group.front()].name.c_str(), group.size() - 1,
-                run.result.milliseconds / 1000);
+    if (arguments_.as_json || progress) return;
+    std::printf("group %zu of %zu: %s, %.2f s\n", number + 1, groups_.size(),
+                name_of(group, images_).c_str(), run.result.milliseconds / 1000);
     std::fflush(stdout);
   }
 
@@ -309,6 +349,11 @@ class Reconstruction {
       numbers.push_back(i);
       views.push_back(images_.views[i]);
     }
+    if (views.empty()) {
+      throw ws::Error(
+          "No images see anything in common; check the poses, masks and the range of "
+          "distances.");
+    }
     std::vector<std::vector<std::size_t>> others(views.size());
     for (std::size_t i = 0; i < views.size(); ++i) {
       for (const std::size_t other : images_.selection->sources(numbers[i], images_.views.size())) {
@@ -319,7 +364,7 @@ class Reconstruction {
     const ws::PointCloud cloud = ws::fuse(
         views, others, [&](std::size_t view) { return maps_of(numbers[view]); }, arguments_.fusion,
         [&bar](double share) { bar.show(share); });
-    ws::write_ply(folders_.folder() / cloud_name, cloud);
+    ws::write_ply(folders_.folder() / cloud_name, cloud, images_.origin);
     const std::size_t middle = numbers[numbers.size() / 2];
     const ws::ColourRange range = ws::robust_range(distance_of(middle));
     ws::write_image(

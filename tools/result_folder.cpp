@@ -18,6 +18,7 @@
 #include "temporary_folder.h"
 #include "text/formatted.h"
 #include "text/json_text.h"
+#include "text/lower_case.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
@@ -115,7 +116,9 @@ class ViewWriter {
       const ws::PointCloud cloud = ws::make_point_cloud(
           accepted_, ws::ray_image(view_.camera, view_.mask), result_.normals,
           contents_.images[index_], result_.confidence, view_.world_from_camera);
-      if (!format_.no_cloud) ws::write_ply(named("cloud", ".ply"), cloud);
+      if (!format_.no_cloud) {
+        ws::write_ply(named("cloud", ".ply"), cloud, contents_.world_origin);
+      }
       if (!format_.no_pictures) write_pictures(cloud);
     }
     const cv::Mat textured = textured_pixels();
@@ -131,6 +134,7 @@ class ViewWriter {
             {"intrinsics", intrinsics_of(view_.camera)},
             {"world_from_camera", to_json(view_.world_from_camera)},
             {"blur_pixels", contents_.blurs.empty() ? 0 : contents_.blurs[index_]},
+            {"gain", result_.gain},
             {"accepted", accepted_share(result_)},
             {"filled", share_of_usable(result_, (result_.reasons & ws::reason_filled) != 0)},
             {"mean_cost", scores.mean_cost},
@@ -289,6 +293,22 @@ double accepted_share(const std::vector<ws::ViewResult>& views) {
   return share;
 }
 
+void report_nearest(const std::vector<ws::ViewResult>& views, double min_distance) {
+  constexpr double near = 1.03;  // of the nearest distance
+  constexpr double much = 0.01;  // none lie there where the range fits
+  double accepted = 0, nearest = 0;
+  for (const ws::ViewResult& view : views) {
+    const cv::Mat distance = ws::accepted_distance(view);
+    accepted += cv::countNonZero(distance > 0);
+    nearest += cv::countNonZero((distance > 0) & (distance < near * min_distance));
+  }
+  if (nearest <= much * accepted) return;
+  std::printf(
+      "%.0f %% of what was accepted lies at the nearest distance, and is wrong where the scene is "
+      "nearer: give a smaller --min-distance.\n",
+      100 * nearest / accepted);
+}
+
 void report_little_accepted(double share, const std::string& first_cause) {
   constexpr double little = 0.4;  // pairs that fit have half or more (docs/accuracy.md)
   if (share >= little) return;
@@ -310,10 +330,21 @@ void FolderFormat::add_maps_to(CLI::App& command) {
       ->group(group);
 }
 
-void add_png_scale_of_input(CLI::App& command, double& scale) {
-  command.add_option("--png-scale", scale, "Units per metre of a 16-bit PNG of distances")
+void add_png_scale_of_input(CLI::App& command, const std::string& option, double& scale) {
+  const bool of_truth = option.find("truth") != std::string::npos;
+  command
+      .add_option(option, scale,
+                  std::string("Units per metre of a 16-bit PNG of ") +
+                      (of_truth ? "true distances" : "distances"))
       ->check(positive_number())
       ->capture_default_str();
+}
+
+void require_scaled_png(const std::string& option, double scale, const fs::path& map) {
+  const bool is_png = ws::lower_case(map.extension().string()) == ".png";
+  if (is_png || scale == FolderFormat::usual_png_scale) return;
+  throw ws::Error(option + " has no effect on " + map.string() +
+                  ", which is no PNG; leave it out.");
 }
 
 void FolderFormat::add_to(CLI::App& command) {

@@ -50,12 +50,17 @@ double accepted_share(const widestereo::ViewResult& view);
 /// The mean of the views.
 double accepted_share(const std::vector<widestereo::ViewResult>& views);
 
-/// Adds --png-scale of a distance map that is read.
-void add_png_scale_of_input(CLI::App& command, double& scale);
+/// Adds the scale of a distance map that is read, --png-scale or --truth-png-scale.
+void add_png_scale_of_input(CLI::App& command, const std::string& option, double& scale);
+/// Throws Error where it was given for a map that has none.
+void require_scaled_png(const std::string& option, double scale, const std::filesystem::path& map);
 
 /// Says what to check where so little is accepted of all views that the images hardly fit their
 /// calibration.
 void report_little_accepted(double share, const std::string& first_cause);
+
+/// Says so where much of what was accepted lies at the nearest distance that was looked for.
+void report_nearest(const std::vector<widestereo::ViewResult>& views, double min_distance);
 
 struct FolderContents {
   const widestereo::Rig& rig;

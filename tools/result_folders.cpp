@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 #include <utility>
 
 #include "result_folder.h"
@@ -102,7 +103,12 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
   }
   const fs::path path = record_path(kind_.name);
   record_ = {{"settings", settings}, {kind_.results, Json::array()}};
-  if (!fs::exists(path)) return;
+  if (!fs::exists(path)) {
+    for (const std::string& file : kind_.files) {
+      if (fs::exists(folder_ / file)) refuse(folder_ / file);
+    }
+    return;
+  }
   const Json before = Json::parse(std::ifstream(path), nullptr, false);
   const bool is_record = before.is_object() && before.value("settings", Json()).is_object() &&
                          before.value(kind_.results, Json()).is_array();
@@ -127,9 +133,16 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
 }
 
 void ResultFolders::keep(const Json& kept) {
+  std::multiset<std::string> names;
+  for (const Json& result : kept) names.insert(result["name"].get<std::string>());
   for (const Json& result : results()) {
-    if (std::find(kept.begin(), kept.end(), result) != kept.end()) continue;
-    obsolete_.push_back(result["name"].get<std::string>());
+    const std::string name = result["name"].get<std::string>();
+    const auto found = names.find(name);
+    if (found == names.end()) {
+      obsolete_.push_back(name);
+    } else {
+      names.erase(found);
+    }
   }
   record_[kind_.results] = kept;
 }
@@ -160,13 +173,20 @@ void ResultFolders::require_usable(const std::string& name) const {
                   first + "; rename its images.");
 }
 
+void ResultFolders::require_free(const std::string& name) const {
+  const fs::path path = folder_ / name;
+  if (fs::exists(path) && !is_of_this_kind(record_in(path))) refuse(path);
+}
+
+void ResultFolders::refuse(const fs::path& path) const {
+  throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +
+                  "; choose another folder, or remove it.");
+}
+
 void ResultFolders::remove(const std::string& name) const {
   const fs::path path = folder_ / name;
   if (!fs::exists(path)) return;
-  if (!is_of_this_kind(record_in(path))) {
-    throw ws::Error(path.string() + " is there already and is no result of a " + kind_.name +
-                    "; choose another folder, or remove it.");
-  }
+  require_free(name);
   // Whenever the run ends, a result is there as a whole or not at all.
   std::error_code error;
   fs::rename(path, folder_ / removed, error);
@@ -186,7 +206,7 @@ void ResultFolders::add(const std::string& name,
   remove(name);
   // First, so that what has the name is known to be a result, whenever the run ends.
   record_[kind_.results].push_back(std::move(result));
-  write_record();
+  write_record_now_and_then();
   const fs::path path = folder_ / name;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
@@ -200,6 +220,26 @@ void ResultFolders::note(const std::string& key, Json value) {
 }
 
 void ResultFolders::write_record() {
+  const Clock::time_point begin = Clock::now();
   for (const std::string& old : std::exchange(obsolete_, {})) remove(old);
   ws::write_text(record_path(kind_.name), ws::to_text(record_) + "\n");
+  written_ = Clock::now();
+  writing_ = written_ - begin;
+  is_written_ = true;
+}
+
+void ResultFolders::write_record_now_and_then() {
+  constexpr int least_share = 20;  // of the time goes to it
+  is_written_ = false;
+  // What is obsolete may have the name of what is added next.
+  if (!obsolete_.empty() || Clock::now() - written_ >= least_share * writing_) write_record();
+}
+
+ResultFolders::~ResultFolders() {
+  if (is_written_) return;
+  try {
+    write_record();
+  } catch (const std::exception&) {
+    // What it lacks is made again.
+  }
 }

@@ -3,6 +3,7 @@
 // a record of all of them and of the settings, by which the run is taken up again.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -33,8 +34,8 @@ class ResultFolders {
 
   /// Takes up the folder where an earlier run left it; throws Error where that was of another kind.
   /// `settings`: all that decides the results; throws Error naming the first difference to those of
-  /// an earlier run. With `overwrite` its results are removed instead, as soon as there is
-  /// something new to record.
+  /// an earlier run, or, where there is none, what has the name of one of the whole run's files.
+  /// With `overwrite` its results are removed instead, as soon as there is something new to record.
   ResultFolders(std::filesystem::path folder, Kind kind, const Json& settings, bool overwrite);
 
   /// Throws Error where the folder holds such a run, or one of its results: another result there
@@ -60,28 +61,48 @@ class ResultFolders {
   /// What FolderContents::origin says of whose result it is.
   Json origin() const { return {{"run", kind_.name}}; }
 
+  /// Throws Error where something else than a result of this kind has the name.
+  void require_free(const std::string& name) const;
+
   /// Adds a result: `write` fills the folder that it is given, with that origin, and returns the
   /// record, which has the name. The result appears when all of it is there. Throws Error where
   /// something else has the name, or where it is not usable.
   void add(const std::string& name, const std::function<Json(const std::filesystem::path&)>& write);
 
+  /// Whether the record on the disk has all results. It may lag behind where writing it takes long.
+  bool is_recorded() const { return is_written_; }
+
   /// Notes something of the whole run in the record.
   void note(const std::string& key, Json value);
 
+  /// Writes what has not been yet.
+  ~ResultFolders();
+  ResultFolders(const ResultFolders&) = delete;
+  ResultFolders& operator=(const ResultFolders&) = delete;
+
  private:
+  using Clock = std::chrono::steady_clock;
+
   std::filesystem::path record_path(const std::string& kind) const {
     return folder_ / (kind + ".json");
   }
   void read(const Json& settings, bool overwrite);
   bool is_record_of_result(const Json& record) const;
+  [[noreturn]] void refuse(const std::filesystem::path& path) const;
   /// Removes a result, of this run or of an earlier one, and folders that it leaves empty.
   void remove(const std::string& name) const;
   /// What is obsolete goes first, for nothing would know of it afterwards.
   void write_record();
+  /// The same, but where that takes its time not for each of many thousand results. Those that the
+  /// record lacks where a run is killed are made again.
+  void write_record_now_and_then();
 
   std::filesystem::path folder_;
   std::optional<FolderLock> lock_;
   Kind kind_;
   Json record_;
   std::vector<std::string> obsolete_;  // names of results to be removed
+  bool is_written_ = true;
+  Clock::time_point written_{};
+  Clock::duration writing_{};  // how long it took
 };

@@ -21,8 +21,10 @@ void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_othe
 
 void RigSettings::add_fields_of_view_to(CLI::App& command) {
   command
-      .add_option("--mask", masks,
-                  "Image, 0 = ignore the pixel; one for all views or one for each (by comma)")
+      .add_option(
+          "--mask", masks,
+          "Image, 0 = ignore the pixel (of a JPEG, below 128); one for all views or one for "
+          "each (by comma)")
       ->delimiter(',');
   command
       .add_option(
@@ -85,7 +87,7 @@ ws::CalibratedImages RigSettings::images_of(const ws::SfmModel& model,
 }
 
 void add_mask(ws::View& view, const cv::Mat& mask, const std::string& name) {
-  ws::require_calibrated_size(mask, view, name);
+  ws::require_mask_size(mask, view, name);
   // Not &=, as other views may share the pixels.
   view.mask = view.mask.empty() ? mask : cv::Mat(view.mask & mask);
 }
@@ -113,7 +115,8 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
 }
 
 bool RigSettings::looks_for_rim_of(const ws::Camera& camera) const {
-  return max_theta == 0 && masks.empty() && camera.max_theta >= std::numbers::pi;
+  return max_theta == 0 && masks.empty() && camera.max_theta >= std::numbers::pi &&
+         ws::may_show_rim(camera);
 }
 
 void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& images) const {

@@ -2,6 +2,7 @@
 #include "sequence_folder.h"
 
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -52,22 +53,30 @@ std::size_t SequenceFolder::finished(const std::vector<Json>& wanted) {
     kept.push_back(frame);
   }
   results_.keep(kept);
+  if (!kept.empty()) with_planes_ = {kept.back()["name"].get<std::string>()};
+  for (std::size_t i = kept.size(); i < wanted.size(); ++i) {
+    results_.require_free(wanted[i]["name"].get<std::string>());
+  }
   return kept.size();
 }
 
 void SequenceFolder::add(const std::string& name, const std::vector<ws::ViewResult>& views,
                          const std::function<Json(const fs::path&)>& write) {
-  const std::string previous = frames().empty() ? "" : frames().back()["name"].get<std::string>();
   results_.add(name, [&](const fs::path& folder) {
     Json frame = write(folder);
     write_planes(folder, views);
     return frame;
   });
-  if (previous.empty()) return;
-  std::error_code ignored;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    fs::remove(results_.folder() / previous / of_view("planes", i).append(".tiff"), ignored);
+  // Of the last frame in the record alone, which begins the rest.
+  if (results_.is_recorded()) {
+    std::error_code ignored;
+    for (const std::string& earlier : std::exchange(with_planes_, {})) {
+      for (std::size_t i = 0; i < views.size(); ++i) {
+        fs::remove(results_.folder() / earlier / of_view("planes", i).append(".tiff"), ignored);
+      }
+    }
   }
+  with_planes_.push_back(name);
 }
 
 std::vector<ws::ViewResult> SequenceFolder::planes(const std::string& name,

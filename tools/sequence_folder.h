@@ -40,4 +40,5 @@ class SequenceFolder {
 
  private:
   ResultFolders results_;
+  std::vector<std::string> with_planes_;  // by which a killed run may be taken up again
 };

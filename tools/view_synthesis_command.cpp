@@ -43,6 +43,7 @@ void run_synthesis(const SynthesisArguments& a) {
   cv::Mat other = ws::to_grey_levels(a.white_level.read(a.other), a.other);
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
+  require_scaled_png("--png-scale", a.png_scale, a.distance);
   const cv::Mat distance = ws::read_map(a.distance, a.png_scale);
   require_values(distance, a.distance, 1, "a distance map");
   image = a.size.reduced(image, rig.views[0], a.image);
@@ -86,7 +87,7 @@ void add_view_synthesis_command(CLI::App& app) {
                  "As it was given when the distances were matched: larger images are reduced to "
                  "this width and height at most, pixels");
   a->white_level.add_to(*command);
-  add_png_scale_of_input(*command, a->png_scale);
+  add_png_scale_of_input(*command, "--png-scale", a->png_scale);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_synthesis(*a); });

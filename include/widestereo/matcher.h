@@ -68,6 +68,7 @@ struct ViewResult {
   /// the source view, rejected or not; 0 where there is no plane or it was filled.
   cv::Mat confidence;
   cv::Mat reasons;  ///< CV_16UC1, Reason bits; 0 = accepted
+  double gain = 1;  ///< by which the view's intensities were multiplied (Options::max_gain)
 };
 
 /// Work of a kernel, counted from the order of kernels and the parameters for comparing times with
@@ -129,7 +130,8 @@ class Matcher {
   /// Called between submissions with the share done in [0, 1]. What it throws ends the match.
   using Progress = std::function<void(double)>;
 
-  /// Views that a rig may have; where Options::levels asks for four levels it is 12, for five 9.
+  /// Views that a rig may have; where Options::levels asks for four levels it is 12, for five 9,
+  /// for six 8, for seven or eight 6.
   static constexpr int most_views = 15;
 
   /// Throws Error when the rig or the options are invalid or the device lacks memory or a feature.
@@ -138,8 +140,9 @@ class Matcher {
   Matcher(Matcher&&) noexcept;
   Matcher& operator=(Matcher&&) noexcept;
 
-  /// One image per view: 8 or 16 bit, grey or colour. The same seed gives the same bits on one
-  /// device. Throws Error for images that do not fit, and where no view sees what another one does.
+  /// One image per view: 8 or 16 bit, or floats in [0, 1], grey or colour. The same seed gives the
+  /// same bits on one device. Throws Error for images that do not fit, and NoOverlap where no view
+  /// sees what another one does.
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress = {});
   StereoResult match(const cv::Mat& left, const cv::Mat& right, const Progress& progress = {}) {
     return match(std::vector<cv::Mat>{left, right}, progress);

@@ -147,9 +147,14 @@ struct Options {
   /// edges.
   int warm_regressions = 1;
 
+  /// What is given in grey levels, here and in the kernels, is meant for images of usual contrast:
+  /// a Matcher multiplies intensities of which all but 4 % lie within less than 64 grey levels by
+  /// up to this factor, 1..1000, so that they fill these; 1 = none. A CudaMatcher or VulkanMatcher
+  /// takes images as they are.
+  double max_gain = 1;
   double min_texture = 0.5;  ///< grey levels (0..255): patches with a smaller standard deviation
                              ///< carry no information
-  double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0..1
+  double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0.01..1
 
   /// Left-right check: largest relative difference of distance, 0..999.
   double consistency_relative = 0.02;

@@ -9,6 +9,7 @@
 #include "kernel/maps.h"
 #include "matching/match_setup.h"
 #include "schedule/work.h"
+#include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -40,6 +41,23 @@ cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat
   return intensity;
 }
 
+/// Dark, or hazy: what lies between the darkest and the brightest pixels is less than a quarter of
+/// all there is. By this factor, up to `most`, it becomes as much.
+double gain_for(const cv::Mat& masked_intensity, double most) {
+  constexpr double least_contrast = 0.25, outliers = 0.02;
+  constexpr std::size_t sample = 100'000;
+  if (most <= 1) return 1;
+  std::vector<float> values;
+  const std::size_t step = masked_intensity.total() / sample + 1;
+  for (std::size_t i = 0; i < masked_intensity.total(); i += step) {
+    const float value = masked_intensity.ptr<float>()[i];
+    if (value >= 0) values.push_back(value);
+  }
+  const double contrast = static_cast<double>(percentile(values, 1 - outliers)) -
+                          static_cast<double>(percentile(values, outliers));
+  return std::clamp(least_contrast / std::max(contrast, least_contrast / most), 1.0, most);
+}
+
 /// Distance, normal and cost maps of plane hypotheses; planes without a cost are left out.
 void unpack_hypotheses(const cv::Mat_<cv::Vec4f>& hypotheses, const cv::Mat_<cv::Vec4f>& rays,
                        ViewResult& result) {
@@ -69,7 +87,7 @@ void require_overlap(const std::vector<ViewResult>& views) {
     const auto has_cost = [](float cost) { return cost < INVALID_COST; };
     if (std::any_of(view.cost.begin<float>(), view.cost.end<float>(), has_cost)) return;
   }
-  throw Error(
+  throw NoOverlap(
       "The images do not overlap: no pixel of any view is seen by another one within the distance "
       "range; check the calibration, the order of the images, masks and the range.");
 }
@@ -113,7 +131,8 @@ class Matcher::Implementation {
       : rig_(rig),
         setup_(rig, options, device.info()),
         backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)),
-        rays_(setup_.set_rays(*backend_)) {}
+        rays_(setup_.set_rays(*backend_)),
+        max_gain_(options.max_gain) {}
 
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress) {
     return run(setup_.schedule, images, progress);
@@ -121,11 +140,8 @@ class Matcher::Implementation {
 
   StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
                           const Progress& progress) {
-    if (start.hypotheses.empty() && !holds_planes_) {
-      throw Error(
-          "There are no planes of a previous frame to start from; match one without a warm start "
-          "or give its planes.");
-    }
+    require_planes(holds_planes_ || !start.hypotheses.empty(),
+                   "match one without a warm start or give its planes.");
     if (!start.hypotheses.empty() && start.hypotheses.size() != rig_.views.size()) {
       throw Error("The rig has " + std::to_string(rig_.views.size()) + " views, but planes of " +
                   std::to_string(start.hypotheses.size()) + " were given to start from.");
@@ -152,8 +168,14 @@ class Matcher::Implementation {
                   std::to_string(images.size()) + " image(s) were given.");
     }
     std::vector<cv::Mat> intensities;
+    std::vector<double> gains;
     for (std::size_t i = 0; i < images.size(); ++i) {
       intensities.push_back(masked_intensities(images[i], rig_.views[i], rays_[i]));
+      gains.push_back(gain_for(intensities.back(), max_gain_));
+      if (gains.back() == 1) continue;
+      const cv::Mat masked = intensities.back() < 0;
+      intensities.back() *= gains.back();
+      intensities.back().setTo(MASKED_INTENSITY, masked);
     }
     // What is refused is refused above, and leaves the planes of the last match in place.
     holds_planes_ = false;
@@ -169,6 +191,7 @@ class Matcher::Implementation {
       ViewResult& view = result.views.emplace_back();
       unpack_hypotheses(backend_->hypotheses(static_cast<int>(i)), rays_[i], view);
       unpack_checks(backend_->checks(static_cast<int>(i)), view);
+      view.gain = gains[i];
     }
     require_overlap(result.views);
     holds_planes_ = true;
@@ -188,6 +211,7 @@ class Matcher::Implementation {
   MatchSetup setup_;
   std::unique_ptr<Backend> backend_;
   std::vector<cv::Mat> rays_;  // of the rig's views
+  double max_gain_;
   bool holds_planes_ = false;  // of a frame that was matched to the end
 };
 

@@ -51,6 +51,7 @@ Options Options::preset_named(const std::string& name) {
   options.min_texture = 0;
   options.max_cost = 0.8;
   options.far_preference = 0.08;
+  options.max_gain = 20;
   options.warm_iterations = 1;
   options.pattern = PatchPattern::checkerboard;
   options.alternate_strips = true;
@@ -123,8 +124,9 @@ void validate(const Options& o) {
   require_between(o.step_normal, 0, 2, "step normal");
   require_between(o.warm_iterations, 0, 100000, "warm iterations");
   require_between(o.warm_regressions, 0, 1000, "warm regressions");
+  require_between(o.max_gain, 1, 1000, "max gain");
   require_between(o.min_texture, 0, 255, "min texture");
-  require_between(o.min_visible, 0, 1, "min visible");
+  require_between(o.min_visible, 0.01, 1, "min visible");
   require_between(o.consistency_relative, 0, 999, "consistency (relative)");
   require_between(o.consistency_pixels, 0, 999, "consistency (pixels)");
   require_between(o.max_cost, 0, 2, "max cost");
@@ -180,6 +182,7 @@ std::string to_json(const Options& o) {
       {"best_sources", o.best_sources},
       {"warm_iterations", o.warm_iterations},
       {"warm_regressions", o.warm_regressions},
+      {"max_gain", o.max_gain},
       {"min_texture", o.min_texture},
       {"min_visible", o.min_visible},
       {"consistency_relative", o.consistency_relative},

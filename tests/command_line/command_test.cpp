@@ -701,7 +701,10 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
                    file("calib.yaml"),
                "is given twice");
   expect_error(depth_of("half.png", "left.png"),
-               "`calibration convert --scale` makes a calibration for reduced images.");
+               "`calibration convert --scale` makes a calibration for reduced images, but not of a "
+               "COLMAP model");
+  expect_error(depth_of("left.png", "right.png") + "--mask " + file("half.png"),
+               "half.png is 48x48 pixels, but the images of cam0 have 96x96; give a mask of");
   EXPECT_EQ(run("calibration show " + file("calib.json")).exit_code, 0);
   expect_error("calibration show " + file("left.png"), "left.png");
   cv::imwrite(file("flat.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(7)));
@@ -909,6 +912,13 @@ TEST_F(Command, CalibrationIsRefined) {
   EXPECT_NE(verdict("off.yaml").find("too inaccurate for stereo: calibrate again\n"),
             std::string::npos)
       << verdict("off.yaml");
+  for (const char* json_too : {"", " --json"}) {
+    const auto ends_with = [&](const std::string& calibration) {
+      return run("calibration check " + pair + "-c " + file(calibration) + json_too).exit_code;
+    };
+    EXPECT_EQ(ends_with("calib.yaml"), 0);
+    EXPECT_EQ(ends_with("off.yaml"), 2);
+  }
   folder_.write("far_off.yaml", replaced(bytes_of("calib.yaml"), rows,
                                          "[0.0, 0.97814760, -0.20791169, 0.0]\n"
                                          "  - [0.0, 0.20791169, 0.97814760, 0.0]"));

@@ -45,6 +45,7 @@ const std::vector<GivenOption> options_of_fast = {
     {"--coarse-planes", "3", "coarse_planes", 3},
     {"--alternate-strips", "false", "alternate_strips", false},
     {"--best-sources", "4", "best_sources", 4},
+    {"--max-gain", "2.5", "max_gain", 2.5},
     {"--min-texture", "1.5", "min_texture", 1.5},
     {"--min-visible", "0.7", "min_visible", 0.7},
     {"--consistency-relative", "0.03", "consistency_relative", 0.03},

@@ -172,13 +172,16 @@ TEST_F(Output, PicturesDoNotReplaceWhatIsRead) {
 TEST_F(Output, DistancePngsOfAnyScaleAreRead) {
   ASSERT_EQ(run(depth_of("left.png", "right.png") + "--formats tiff,png --png-scale 500").exit_code,
             0);
-  const auto median = [this](const std::string& distance) {
+  const auto median = [this](const std::string& distance,
+                             const std::string& truth = "out/distance0.tiff") {
     const Outcome outcome = run("evaluate " + file(distance) + " -c " + file("calib.yaml") +
-                                " --json --truth " + file("out/distance0.tiff"));
+                                " --json --truth " + file(truth));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
     return nlohmann::json::parse(outcome.output)["regions"][0]["median_relative"].get<double>();
   };
   EXPECT_LT(median("out/distance0.png --png-scale 500"), 0.01);
+  EXPECT_LT(median("out/distance0.tiff --truth-png-scale 500", "out/distance0.png"), 0.01);
+  EXPECT_GT(median("out/distance0.tiff", "out/distance0.png"), 0.3);
   EXPECT_NEAR(median("out/distance0.png"), 0.5, 0.01);
   const std::string synthesis = "view-synthesis " + file("out/distance0.png") + " " +
                                 file("left.png") + " " + file("right.png") + " -c " +

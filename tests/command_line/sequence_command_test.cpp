@@ -117,6 +117,18 @@ TEST_F(SequenceCommand, ResumesWithTheSameBits) {
   EXPECT_TRUE(fs::exists(folder_ / "parts/001/result.json"));
 }
 
+/// The record of many frames is not written for each of them.
+TEST_F(SequenceCommand, ResumesFromTheLastFrameInTheRecord) {
+  const std::string options = "--restart-below 0 ";
+  ASSERT_EQ(run(sequence("whole") + options).exit_code, 0);
+  ASSERT_EQ(run(sequence() + options + "--count 2").exit_code, 0);
+  fs::copy(folder_ / "whole/002", folder_ / "out/002");
+  const Outcome rest = run(sequence() + options);
+  ASSERT_EQ(rest.exit_code, 0) << rest.output;
+  expect_same_results("whole", "out");
+  EXPECT_FALSE(fs::exists(folder_ / "out/001/planes0.tiff"));
+}
+
 TEST_F(SequenceCommand, ResumesWithAnotherNumberOfThreads) {
   ASSERT_EQ(run(sequence() + "--count 1").exit_code, 0);
   const std::string first = bytes_of("out/000/result.json");
