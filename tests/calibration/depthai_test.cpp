@@ -6,6 +6,7 @@
 
 #include "damaged_texts.h"
 #include "error_of.h"
+#include "replaced.h"
 #include "temporary_folder.h"
 #include "widestereo/calibration.h"
 
@@ -112,9 +113,8 @@ TEST_F(DepthAi, LengthsMayHaveAUnit) {
         "], [2, " + camera("1", "0, 0, 0, 0", "1280", nowhere) + "]]}";
     const Rig rig = read_calibration(folder_.write("calib.json", text)).rig;
     EXPECT_NEAR(rig.views[1].world_from_camera.translation().x(), 7.5 * metres, 1e-12);
-    std::string own = text;
-    own.replace(own.find("\"lengthUnit\": ") + 14, 1, "5");
-    EXPECT_THAT(error(own), HasSubstr("The lengthUnit is 5"));
+    EXPECT_THAT(error(test::replaced(text, "Unit\": " + std::string(unit), "Unit\": 5")),
+                HasSubstr("The lengthUnit is 5"));
   }
 }
 
