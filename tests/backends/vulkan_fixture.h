@@ -140,7 +140,7 @@ class FaultyLoader {
 };
 
 /// Does `work` on a device of its own again and again while one function after the other that makes
-/// something fails, in the middle one of its calls.
+/// something fails, in the middle one of its calls, and finds what is left.
 void expect_failures_leave_no_object(const std::function<void(const VulkanContext&)>& work);
 
 }  // namespace widestereo::test
