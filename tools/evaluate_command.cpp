@@ -180,7 +180,7 @@ void add_evaluate_command(CLI::App& app) {
   auto a = std::make_shared<EvaluateArguments>();
   command->add_option("prediction", a->prediction, "Distance map: .tiff, .exr, .pfm or 16-bit .png")
       ->required();
-  add_png_scale_of_input(*command, "--png-scale", a->png_scale);
+  add_png_scale_of_input(*command, "--png-scale", "distances", a->png_scale);
   command->add_option("--normals", a->normals, "Normal map to score as well");
   command->add_option(
       "--confidence", a->confidence,
@@ -191,7 +191,7 @@ void add_evaluate_command(CLI::App& app) {
       "Folder with depthN.tiff, validN.png, occN.png or occN_M.png, normalN.tiff, camN.png, "
       "fovN.png, calib.yaml");
   command->add_option("--truth", a->truth, "Ground truth, metres along the ray");
-  add_png_scale_of_input(*command, "--truth-png-scale", a->truth_png_scale);
+  add_png_scale_of_input(*command, "--truth-png-scale", "true distances", a->truth_png_scale);
   command->add_option("--valid", a->valid, "Mask, 0 = do not score");
   command->add_option("--occlusion", a->occlusion,
                       "255 visible in the source, 0 occluded, 128 outside");

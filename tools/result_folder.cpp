@@ -330,12 +330,9 @@ void FolderFormat::add_maps_to(CLI::App& command) {
       ->group(group);
 }
 
-void add_png_scale_of_input(CLI::App& command, const std::string& option, double& scale) {
-  const bool of_truth = option.find("truth") != std::string::npos;
-  command
-      .add_option(option, scale,
-                  std::string("Units per metre of a 16-bit PNG of ") +
-                      (of_truth ? "true distances" : "distances"))
+void add_png_scale_of_input(CLI::App& command, const std::string& option,
+                            const std::string& distances, double& scale) {
+  command.add_option(option, scale, "Units per metre of a 16-bit PNG of " + distances)
       ->check(positive_number())
       ->capture_default_str();
 }

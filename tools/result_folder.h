@@ -50,8 +50,9 @@ double accepted_share(const widestereo::ViewResult& view);
 /// The mean of the views.
 double accepted_share(const std::vector<widestereo::ViewResult>& views);
 
-/// Adds the scale of a distance map that is read, --png-scale or --truth-png-scale.
-void add_png_scale_of_input(CLI::App& command, const std::string& option, double& scale);
+/// Adds the scale of a distance map that is read; `distances`: which, in the option's help.
+void add_png_scale_of_input(CLI::App& command, const std::string& option,
+                            const std::string& distances, double& scale);
 /// Throws Error where it was given for a map that has none.
 void require_scaled_png(const std::string& option, double scale, const std::filesystem::path& map);
 

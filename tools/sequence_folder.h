@@ -29,7 +29,7 @@ class SequenceFolder {
   Json origin() const { return results_.origin(); }
 
   /// Adds a frame: `write` fills the folder that it is given and returns the frame's record. The
-  /// frame appears when all of it is there. Its planes are kept until the next one is.
+  /// frame appears when all of it is there. Its planes are kept until the next one is recorded.
   void add(const std::string& name, const std::vector<widestereo::ViewResult>& views,
            const std::function<Json(const std::filesystem::path&)>& write);
 

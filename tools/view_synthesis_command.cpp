@@ -87,7 +87,7 @@ void add_view_synthesis_command(CLI::App& app) {
                  "As it was given when the distances were matched: larger images are reduced to "
                  "this width and height at most, pixels");
   a->white_level.add_to(*command);
-  add_png_scale_of_input(*command, "--png-scale", a->png_scale);
+  add_png_scale_of_input(*command, "--png-scale", "distances", a->png_scale);
   command->add_option("--picture", a->picture, "Write the warped image");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_synthesis(*a); });

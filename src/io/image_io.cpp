@@ -111,8 +111,8 @@ bool is_truncated(std::span<const uchar> bytes) {
 }
 
 /// `kind` and `formats`: what the file should be.
-cv::Mat decode(const fs::path& path, const std::string& kind, const std::string& formats) {
-  const std::vector<uchar> bytes = read_bytes(path);
+cv::Mat decode(const std::vector<uchar>& bytes, const fs::path& path, const std::string& kind,
+               const std::string& formats) {
   if (bytes.empty()) throw Error(path.string() + " is empty; give an image file.");
   if (is_truncated(bytes)) throw Error(path.string() + " is truncated or damaged; copy it again.");
   cv::Mat image;
@@ -125,6 +125,16 @@ cv::Mat decode(const fs::path& path, const std::string& kind, const std::string&
   if (image.empty()) {
     throw Error(path.string() + " is not " + kind + " that can be read (or is truncated); use " +
                 formats + ".");
+  }
+  return image;
+}
+
+/// `path`: the file that has them, which messages name.
+cv::Mat image_in(const std::vector<uchar>& bytes, const fs::path& path) {
+  cv::Mat image = decode(bytes, path, "an image", "PNG, JPEG, TIFF, PGM or BMP");
+  const bool depth_known = image.depth() == CV_8U || image.depth() == CV_16U;
+  if (!depth_known || (image.channels() != 1 && image.channels() != 3 && image.channels() != 4)) {
+    throw Error(path.string() + " is not an 8- or 16-bit grey or colour image; convert it first.");
   }
   return image;
 }
@@ -195,14 +205,7 @@ void require_png_scale(double scale) {
 
 }  // namespace
 
-cv::Mat read_image(const fs::path& path) {
-  cv::Mat image = decode(path, "an image", "PNG, JPEG, TIFF, PGM or BMP");
-  const bool depth_known = image.depth() == CV_8U || image.depth() == CV_16U;
-  if (!depth_known || (image.channels() != 1 && image.channels() != 3 && image.channels() != 4)) {
-    throw Error(path.string() + " is not an 8- or 16-bit grey or colour image; convert it first.");
-  }
-  return image;
-}
+cv::Mat read_image(const fs::path& path) { return image_in(read_bytes(path), path); }
 
 double largest_value(const cv::Mat& image) {
   double largest = 0;
@@ -267,7 +270,8 @@ cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
 }
 
 cv::Mat read_mask(const std::filesystem::path& path) {
-  const cv::Mat image = read_image(path);
+  const std::vector<uchar> bytes = read_bytes(path);
+  const cv::Mat image = image_in(bytes, path);
   to_intensity(image, path.string());  // refuses what is no image
   // Before conversion to grey, which rounds the darkest colours to 0.
   std::vector<cv::Mat> channels;
@@ -282,7 +286,7 @@ cv::Mat read_mask(const std::filesystem::path& path) {
                   "are to be ignored.");
     }
   }
-  const int most_ignored = is_jpeg(read_bytes(path)) ? 127 : 0;  // compression changes zeros
+  const int most_ignored = is_jpeg(bytes) ? 127 : 0;  // compression changes zeros
   cv::Mat mask = channels[0] > most_ignored;
   for (std::size_t i = 1; i < std::min<std::size_t>(channels.size(), 3); ++i) {
     mask |= channels[i] > most_ignored;
@@ -305,8 +309,8 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
   const std::string extension = extension_of(path);
   if (extension == ".pfm") return read_pfm(path, read_bytes(path));
   if (extension == ".exr") return read_exr(path, read_bytes(path));
-  const cv::Mat image =
-      decode(path, "a map", "a 32-bit float TIFF or PFM, OpenEXR, or a 16-bit PNG");
+  const cv::Mat image = decode(read_bytes(path), path, "a map",
+                               "a 32-bit float TIFF or PFM, OpenEXR, or a 16-bit PNG");
   cv::Mat map;
   if (image.type() == CV_16UC1) {
     image.convertTo(map, CV_32F, 1 / png_scale);

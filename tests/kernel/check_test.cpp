@@ -67,17 +67,11 @@ class AgreeingViews {
                          const Eigen::Vector3d& plane_of_first = {0.05, 0.1, 0.5},
                          const Rig& rig = fisheye_rig(96))
       : fixture(rig, options), first_(to_kernel(plane_of_first)) {
-    for (int view = 0; view < static_cast<int>(rig.views.size()); ++view) {
-      const vec3 m = plane(view);
-      fixture.view(view).hypotheses.setTo(cv::Scalar(m.x, m.y, m.z, 0.1));
-    }
+    fixture.hold_in_all_views(first_);
   }
 
   /// The plane m . X = 1 of view 0 in the frame of `view`.
-  vec3 plane(int view) {
-    if (view == 0) return first_;
-    return kernel::cpu::plane_in_source(fixture.schedule().parameters.pairs[view], first_);
-  }
+  vec3 plane(int view) { return fixture.plane_in(view, first_); }
 
   int reasons(ivec2 pixel) {
     run_check(fixture, pixel);

@@ -185,11 +185,14 @@ class KernelFixture {
     interpolate();
   }
 
-  /// Lets all views hold a plane of the first one's frame.
+  /// A plane of the first view's frame in that of another one.
+  kernel::vec3 plane_in(int view, const kernel::vec3& m) const {
+    return view == 0 ? m : kernel::cpu::plane_in_source(schedule_.parameters.pairs[view], m);
+  }
+  /// Lets all views hold it.
   void hold_in_all_views(const kernel::vec3& m) {
     for (int i = 0; i < static_cast<int>(views_.size()); ++i) {
-      const kernel::vec3 here =
-          i == 0 ? m : kernel::cpu::plane_in_source(schedule_.parameters.pairs[i], m);
+      const kernel::vec3 here = plane_in(i, m);
       view(i).hypotheses.setTo(cv::Scalar(here.x, here.y, here.z, 0.1));
     }
   }

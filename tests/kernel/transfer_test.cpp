@@ -217,15 +217,6 @@ TEST(Transfer, SurfacesContinueIntoHolesFromEveryDirection) {
   }
 }
 
-template <class Function>
-void over_pixels(KernelFixture& fixture, int view, Function function) {
-  const kernel::cpu::Context context = fixture.context();
-  const cv::Size of_view = fixture.view(view).rays.size();
-  for (int y = 0; y < of_view.height; ++y) {
-    for (int x = 0; x < of_view.width; ++x) function(context, ivec2{x, y});
-  }
-}
-
 TEST(MovingOn, KeepsThePlanesOfImagesThatAreNotSquare) {
   const vec3 wall(0.05f, 0.1f, 0.5f);
   for (const cv::Size image : {cv::Size(96, 64), cv::Size(64, 96)}) {
@@ -233,12 +224,7 @@ TEST(MovingOn, KeepsThePlanesOfImagesThatAreNotSquare) {
     KernelFixture fixture(rig, wide_range("fast"));
     set_motion(fixture.schedule(), rig, Eigen::Isometry3d::Identity(), 1);
     fixture.view(0).hypotheses.setTo(cv::Scalar(wall.x, wall.y, wall.z, 0.1));
-    fixture.set_reference(0);
-    fixture.pass().other = 0;
-    over_pixels(fixture, 0, kernel::cpu::transfer_clear_pixel);
-    over_pixels(fixture, 0, kernel::cpu::transfer_nearest_pixel);
-    over_pixels(fixture, 0, kernel::cpu::transfer_winner_pixel);
-    over_pixels(fixture, 0, kernel::cpu::transfer_keep_pixel);
+    transfer(fixture, 0, 0, kernel::cpu::transfer_keep_pixel);
     int seen = 0;
     int lost = 0;
     for (int y = 0; y < image.height; ++y) {
@@ -267,12 +253,7 @@ TEST(Transfer, TakesPlanesFromThePixelsThatSeeThePoint) {
       fixture.view(0).hypotheses(y, x) = cv::Vec4f(m.x, m.y, m.z, 0.1f);
     }
   }
-  fixture.set_reference(1);
-  fixture.pass().other = 0;
-  over_pixels(fixture, 1, kernel::cpu::transfer_clear_pixel);
-  over_pixels(fixture, 0, kernel::cpu::transfer_nearest_pixel);
-  over_pixels(fixture, 0, kernel::cpu::transfer_winner_pixel);
-  over_pixels(fixture, 1, kernel::cpu::transfer_gather_pixel);
+  transfer(fixture, 0, 1, kernel::cpu::transfer_gather_pixel);
   const Eigen::Isometry3d back = source_from_reference(rig.views[0], rig.views[1]);
   int wrong = 0;
   for (int y = 30; y < 66; ++y) {
