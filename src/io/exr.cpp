@@ -25,7 +25,9 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-constexpr std::int64_t most_pixels = 1 << 30;  // as of OpenCV's images
+// As of OpenCV's images.
+constexpr std::int64_t most_pixels = 1 << 30;
+constexpr std::int64_t longest_side = 1 << 20;
 
 class Bytes : public Imf::IStream {
  public:
@@ -93,9 +95,10 @@ Imf::FrameBuffer frame_buffer(cv::Mat& map, const Names& channels, cv::Point ori
   return buffer;
 }
 
-std::int64_t pixels_of(const Imath::Box2i& window) {
-  return (std::int64_t{window.max.x} - window.min.x + 1) *
-         (std::int64_t{window.max.y} - window.min.y + 1);
+bool is_too_large(const Imath::Box2i& window) {
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
+  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+  return std::max(width, height) > longest_side || width * height > most_pixels;
 }
 
 /// The image, of which a file holds a part (its data) whose first pixel is at `origin`; zero where
@@ -124,7 +127,7 @@ cv::Mat read_exr(const std::filesystem::path& path, const std::vector<uchar>& by
       throw Error(path.string() +
                   " has neither one channel nor R, G and B or X, Y and Z; write the map alone.");
     }
-    if (std::max(pixels_of(window), pixels_of(image)) > most_pixels) {
+    if (is_too_large(window) || is_too_large(image)) {
       throw std::runtime_error("it has too many pixels");
     }
     cv::Mat map(window.max.y - window.min.y + 1, window.max.x - window.min.x + 1,
