@@ -68,6 +68,8 @@ class Backend {
   virtual void set_rays(int view, const cv::Mat& rays) = 0;
   /// Intensities in [0, 1], CV_32FC1, MASKED_INTENSITY where masked; before every run.
   virtual void set_intensity(int view, const cv::Mat& intensity) = 0;
+  /// Makes what a schedule runs, which takes a while where kernels are compiled; else run() does.
+  virtual void compile(const Schedule&) {}
   /// Runs the dispatches in order and waits for them. `progress` may be empty.
   virtual void run(const Schedule& schedule, const Matcher::Progress& progress) = 0;
   /// Plane hypotheses (m, cost), CV_32FC4: memory of the back end, until its next call.

@@ -132,7 +132,9 @@ class Matcher::Implementation {
         setup_(rig, options, device.info()),
         backend_(device.implementation().make_backend(setup_.sizes, setup_.schedule.constants)),
         rays_(setup_.set_rays(*backend_)),
-        max_gain_(options.max_gain) {}
+        max_gain_(options.max_gain) {
+    backend_->compile(setup_.schedule);
+  }
 
   StereoResult match(const std::vector<cv::Mat>& images, const Progress& progress) {
     return run(setup_.schedule, images, progress);

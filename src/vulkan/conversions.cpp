@@ -65,7 +65,7 @@ VkWriteDescriptorSet write_of(Way way, VkDescriptorSet set) {
 }  // namespace
 
 Conversions::Conversions(const VulkanContext& context, const VulkanBackend& backend,
-                         const std::vector<cv::Size>& sizes, const PipelineCache& cache)
+                         const std::vector<cv::Size>& sizes)
     : context_(context), backend_(backend), sizes_(sizes) {
   for (std::size_t i = 0; i < ways_.size(); ++i) {
     OfWay& way = ways_[i];
@@ -74,8 +74,7 @@ Conversions::Conversions(const VulkanContext& context, const VulkanBackend& back
     way.set_layout = make_set_layout(context, {&binding, 1});
     const std::array sets = {backend.pipelines().set_layout(), way.set_layout.get()};
     way.layout = make_pipeline_layout(context, sets, sizeof(PushConstants));
-    way.pipeline =
-        backend.pipelines().make(context, kinds[i].kernel, way.layout.get(), cache.get());
+    way.pipeline = backend.pipelines().make(kinds[i].kernel, way.layout.get());
   }
 }
 

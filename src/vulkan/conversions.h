@@ -4,7 +4,6 @@
 #include <array>
 #include <vector>
 
-#include "vulkan/pipeline_cache.h"
 #include "vulkan/vulkan_backend.h"
 
 namespace widestereo {
@@ -45,7 +44,7 @@ struct BoundConversions {
 class Conversions {
  public:
   Conversions(const VulkanContext& context, const VulkanBackend& backend,
-              const std::vector<cv::Size>& sizes, const PipelineCache& cache);
+              const std::vector<cv::Size>& sizes);
 
   /// Throws Error where the device cannot reach so much of a buffer.
   BoundConversions bind(const std::vector<Conversion>& conversions) const;

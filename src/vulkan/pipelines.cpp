@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "vulkan/pipelines.h"
 
+#include <algorithm>
+#include <exception>
+#include <opencv2/core/utility.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "vulkan/shaders.h"
 #include "widestereo/error.h"
@@ -90,15 +95,44 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
                      VkPipelineCache cache)
-    : constants_{constants, 8, sampled ? 16u : 8u},
+    : context_(context),
+      cache_(cache),
+      constants_{constants, 8, sampled ? 16u : 8u},
       sampled_(sampled),
       half_precision_(filters() && context.filters_half_precision()) {
-  make_layouts(context);
-  for (int i = 0; i < kernel_count; ++i) {
-    const Kernel kernel = static_cast<Kernel>(i);
-    if (kernel == Kernel::iterate_raster) continue;
-    pipelines_[static_cast<std::size_t>(i)] = make(context, variant_of(kernel), layout(), cache);
+  make_layouts();
+}
+
+bool Pipelines::compile(const Schedule& schedule) {
+  std::vector<Kernel> missing;
+  for (const Dispatch& dispatch : schedule.dispatches) {
+    const Kernel kernel = dispatch.kernel;
+    if (kernel == Kernel::iterate_raster) {
+      throw Error(std::string("The kernel ") + to_string(kernel) +
+                  " is sequential and runs on the CPU only; choose the device \"cpu\".");
+    }
+    if (get(kernel) != VK_NULL_HANDLE || std::ranges::count(missing, kernel) > 0) continue;
+    missing.push_back(kernel);
   }
+  const int count = static_cast<int>(missing.size());
+  std::vector<std::exception_ptr> errors(missing.size());  // OpenCV would change their type
+  cv::parallel_for_(
+      cv::Range(0, count),
+      [&](const cv::Range& range) {
+        for (auto i = static_cast<std::size_t>(range.start); std::cmp_less(i, range.end); ++i) {
+          try {
+            pipelines_[static_cast<std::size_t>(missing[i])] =
+                make(variant_of(missing[i]), layout());
+          } catch (...) {
+            errors[i] = std::current_exception();
+          }
+        }
+      },
+      count);
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
+  }
+  return count > 0;
 }
 
 std::string Pipelines::variant_of(Kernel kernel) const {
@@ -115,7 +149,7 @@ bool Pipelines::shares_patches() const {
          PATCH_TILE_SAMPLES(constants_.width, constants_.height, radius) <= LARGEST_PATCH_TILE;
 }
 
-void Pipelines::make_layouts(const VulkanContext& context) {
+void Pipelines::make_layouts() {
   const auto binding = [](Binding number, VkDescriptorType type) {
     return VkDescriptorSetLayoutBinding{number, type, 1, VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
   };
@@ -132,13 +166,12 @@ void Pipelines::make_layouts(const VulkanContext& context) {
       binding(binding_nearest, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
       binding(binding_winner, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER),
   };
-  set_layout_ = make_set_layout(context, bindings);
+  set_layout_ = make_set_layout(context_, bindings);
   const VkDescriptorSetLayout set_layout = set_layout_.get();
-  layout_ = make_pipeline_layout(context, {&set_layout, 1}, sizeof(kernel::PassParameters));
+  layout_ = make_pipeline_layout(context_, {&set_layout, 1}, sizeof(kernel::PassParameters));
 }
 
-Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::string& name,
-                                   VkPipelineLayout layout, VkPipelineCache cache) const {
+Handle<VkPipeline> Pipelines::make(const std::string& name, VkPipelineLayout layout) const {
   static constexpr std::array<VkSpecializationMapEntry, 10> entries = {{
       {0, offsetof(Constants, kernel.window_radius), sizeof(int)},
       {1, offsetof(Constants, kernel.warp), sizeof(int)},
@@ -151,7 +184,7 @@ Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::stri
       {8, offsetof(Constants, width), sizeof(std::uint32_t)},
       {9, offsetof(Constants, height), sizeof(std::uint32_t)},
   }};
-  const Handle<VkShaderModule> module = make_module(context, sampled_ ? name : name + "_loads");
+  const Handle<VkShaderModule> module = make_module(context_, sampled_ ? name : name + "_loads");
   const VkSpecializationInfo specialisation = {static_cast<std::uint32_t>(entries.size()),
                                                entries.data(), sizeof constants_, &constants_};
   VkComputePipelineCreateInfo info{};
@@ -163,19 +196,11 @@ Handle<VkPipeline> Pipelines::make(const VulkanContext& context, const std::stri
   info.stage.pSpecializationInfo = &specialisation;
   info.layout = layout;
   VkPipeline pipeline = VK_NULL_HANDLE;
-  context.check(
-      context.vk().vkCreateComputePipelines(context.device(), cache, 1, &info, nullptr, &pipeline),
+  const DeviceFunctions& vk = context_.vk();
+  context_.check(
+      vk.vkCreateComputePipelines(context_.device(), cache_, 1, &info, nullptr, &pipeline),
       "compile the kernel " + name);
-  return context.own(pipeline, context.vk().vkDestroyPipeline);
-}
-
-VkPipeline Pipelines::get(Kernel kernel) const {
-  const VkPipeline pipeline = pipelines_[static_cast<std::size_t>(kernel)].get();
-  if (pipeline == VK_NULL_HANDLE) {
-    throw Error(std::string("The kernel ") + to_string(kernel) +
-                " is sequential and runs on the CPU only; choose the device \"cpu\".");
-  }
-  return pipeline;
+  return context_.own(pipeline, vk.vkDestroyPipeline);
 }
 
 }  // namespace widestereo

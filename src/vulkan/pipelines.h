@@ -37,8 +37,8 @@ Handle<VkDescriptorPool> make_descriptor_pool(const VulkanContext& context, std:
 VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool,
                              VkDescriptorSetLayout layout);
 
-/// One compute pipeline for each kernel (iterate_raster, which is sequential, excepted),
-/// specialised for constants; all share one descriptor set layout.
+/// One compute pipeline for each kernel that schedules run, specialised for constants; all share
+/// one descriptor set layout. Context and cache must outlive it.
 class Pipelines {
  public:
   /// `sampled`: texels are read through the texture units instead of as storage images, which
@@ -47,6 +47,11 @@ class Pipelines {
   /// device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
             VkPipelineCache cache);
+
+  /// Makes those that a schedule runs and that are not there yet, side by side: drivers take
+  /// seconds for all. Returns whether there were any; throws Error for iterate_raster, which is
+  /// sequential.
+  bool compile(const Schedule& schedule);
 
   bool sampled() const { return sampled_; }
   /// Whether texture units filter.
@@ -60,14 +65,13 @@ class Pipelines {
   }
   VkDescriptorSetLayout set_layout() const { return set_layout_.get(); }
   VkPipelineLayout layout() const { return layout_.get(); }
-  /// Throws Error for iterate_raster.
-  VkPipeline get(Kernel kernel) const;
+  /// Of a schedule that was compiled.
+  VkPipeline get(Kernel kernel) const { return pipelines_[static_cast<std::size_t>(kernel)].get(); }
   /// A further kernel, of shader_code(), with the same constants.
-  Handle<VkPipeline> make(const VulkanContext& context, const std::string& name,
-                          VkPipelineLayout layout, VkPipelineCache cache) const;
+  Handle<VkPipeline> make(const std::string& name, VkPipelineLayout layout) const;
 
  private:
-  void make_layouts(const VulkanContext& context);
+  void make_layouts();
   /// The name among shader_code() of a kernel of the schedule, as these constants want it.
   std::string variant_of(Kernel kernel) const;
   /// Whether `iterate` keeps what patches have in common in memory of workgroups
@@ -81,6 +85,8 @@ class Pipelines {
     std::uint32_t height = 0;
   };
 
+  const VulkanContext& context_;
+  VkPipelineCache cache_;
   Constants constants_;
   bool sampled_;
   bool half_precision_;

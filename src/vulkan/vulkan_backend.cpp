@@ -79,12 +79,12 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
+      cache_(cache),
       pipelines_(make_pipelines(context, constants,
                                 tuning.sampled.value_or(!loads_texels(context.properties())),
                                 cache.get())),
       sampler_(make_sampler(context, pipelines_.filters())),
       command_pool_(make_command_pool(context)) {
-  cache.save();
   make_images(context);
   make_buffers(context);
   make_descriptor_sets();
@@ -468,8 +468,13 @@ struct VulkanBackend::Run {
   std::size_t turn = 0;
 };
 
-void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
+void VulkanBackend::compile(const Schedule& schedule) {
   require_constants(schedule, constants_);
+  if (pipelines_.compile(schedule)) cache_.save();
+}
+
+void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
+  compile(schedule);
   times_.clear();
   milliseconds_ = 0;
   const std::vector<Band> bands = split_into_bands(schedule, max_samples_);

@@ -36,11 +36,12 @@ class VulkanBackend final : public Backend {
                 const VulkanTuning& tuning = {});
   ~VulkanBackend() override;
 
-  /// Records a whole schedule into command buffers of the caller's, which the caller submits to a
-  /// queue of the context's family; submits nothing and waits for nothing. The parameters come
-  /// first, in the first of them; further kernels may follow, and then the dispatches in shares of
-  /// about the same work. The commands wait for earlier compute and transfer commands of the queue;
-  /// a caller that reads the results puts a barrier after them (from compute shader writes).
+  /// Records a whole schedule that was compiled into command buffers of the caller's, which the
+  /// caller submits to a queue of the context's family; submits nothing and waits for nothing. The
+  /// parameters come first, in the first of them; further kernels may follow, and then the
+  /// dispatches in shares of about the same work. The commands wait for earlier compute and
+  /// transfer commands of the queue; a caller that reads the results puts a barrier after them
+  /// (from compute shader writes).
   void record_parameters(VkCommandBuffer commands, const Schedule& schedule) const;
   void record_dispatches(std::span<const VkCommandBuffer> commands, const Schedule& schedule) const;
   /// Lets a kernel see what earlier ones wrote.
@@ -52,6 +53,7 @@ class VulkanBackend final : public Backend {
 
   void set_rays(int view, const cv::Mat& rays) override;
   void set_intensity(int view, const cv::Mat& intensity) override;
+  void compile(const Schedule& schedule) override;
   void run(const Schedule& schedule, const Matcher::Progress& progress) override;
   cv::Mat hypotheses(int view) override;
   void set_hypotheses(int view, const cv::Mat& hypotheses) override;
@@ -104,6 +106,7 @@ class VulkanBackend final : public Backend {
   std::vector<Place> places_of_intensities_;  // which an apron surrounds
   KernelConstants constants_;
   long long max_samples_;
+  PipelineCache& cache_;
   Pipelines pipelines_;
   MapBuffer intensities_;
   MapBuffer rays_;

@@ -50,8 +50,9 @@ class VulkanMatcher::Implementation {
         cache_(context_, pipeline_cache),
         setup_(rig, options, context_.info()),
         backend_(context_, setup_.sizes, setup_.schedule.constants, cache_),
-        conversions_(context_, backend_, setup_.sizes, cache_) {
-    cache_.save();
+        conversions_(context_, backend_, setup_.sizes) {
+    backend_.compile(setup_.schedule);
+    backend_.compile(setup_.warm_schedule);
     setup_.set_rays(backend_);
     backend_.release_staging();
   }

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <mutex>
 
 #include "vulkan_fixture.h"
 
@@ -25,6 +26,7 @@ PFN_vkGetPhysicalDeviceFormatProperties real_formats = nullptr;
 PFN_vkGetPhysicalDeviceImageFormatProperties real_image_limits = nullptr;
 
 Faults& faults() { return FaultyLoader::faults(); }
+std::mutex counting;  // pipelines are made in several threads
 
 /// A function of a device that may fail, named by `Name::text`.
 template <class Function, class Name>
@@ -35,7 +37,11 @@ template <class... Arguments, class Name>
 struct Fallible<VkResult(VKAPI_PTR*)(Arguments...), Name> {
   static inline VkResult(VKAPI_PTR* real)(Arguments...) = nullptr;
   static VKAPI_ATTR VkResult VKAPI_CALL call(Arguments... arguments) {
-    const int calls_before = faults().calls[Name::text]++;
+    int calls_before = 0;
+    {
+      const std::lock_guard lock(counting);
+      calls_before = faults().calls[Name::text]++;
+    }
     if (faults().failing_function == Name::text && faults().failing_call == calls_before) {
       return VK_ERROR_OUT_OF_HOST_MEMORY;
     }

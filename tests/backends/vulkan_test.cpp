@@ -120,6 +120,44 @@ TEST(VulkanMatch, RunsEveryKernelWithoutValidationMessage) {
   }
 }
 
+TEST(VulkanMatch, CompilesOnceAndOnlyWhatItRuns) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  const auto device = open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr());
+  KernelFixture match = small_match("fast");
+  const Schedule& cold = match.schedule();
+  Schedule warm = make_warm_schedule(match.rig(), options_of_small_match("fast"));
+  set_motion(warm, match.rig(), Eigen::Isometry3d::Identity(), 1);
+  const auto backend = device->make_backend(sizes_of(cold.views), cold.constants);
+  upload(*backend, match);
+  const int& compiled = FaultyLoader::faults().calls["vkCreateComputePipelines"];
+  EXPECT_EQ(compiled, 0);
+  std::set<Kernel> kernels;
+  for (const Schedule& schedule : {cold, cold, warm, cold, warm}) {
+    backend->run(schedule, {});
+    for (const Dispatch& dispatch : schedule.dispatches) kernels.insert(dispatch.kernel);
+    EXPECT_EQ(compiled, static_cast<int>(kernels.size()));
+  }
+  EXPECT_LT(compiled, kernel_count - 1);
+}
+
+/// Whatever fails in one of the threads that compile is told as it is, and may be tried again.
+TEST(VulkanMatch, ReportsWhatFailsToCompile) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  const auto device = open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr());
+  KernelFixture match = small_match("paper");
+  const Schedule& schedule = match.schedule();
+  const auto backend = device->make_backend(sizes_of(schedule.views), schedule.constants);
+  upload(*backend, match);
+  FaultyLoader::faults().failing_function = "vkCreateComputePipelines";
+  FaultyLoader::faults().failing_call = 2;
+  EXPECT_THAT(error_of([&] { backend->compile(schedule); }), HasSubstr("compile the kernel"));
+  backend->run(schedule, {});
+  EXPECT_LT(cv::Mat_<cv::Vec4f>(backend->hypotheses(1))(19, 19)[3], INVALID_COST);
+  EXPECT_THAT(device->validation_messages(), IsEmpty());
+}
+
 TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
   REQUIRE_VULKAN_OR_SKIP();
   const auto device = open_vulkan_device(0, validated(20000));
