@@ -48,6 +48,8 @@ const char* name_of(ws::CalibrationFormat format) {
       return "ORB-SLAM3";
     case ws::CalibrationFormat::depthai:
       return "DepthAI";
+    case ws::CalibrationFormat::ros:
+      return "ROS";
   }
   return "";
 }

@@ -23,6 +23,7 @@ enum class CalibrationFormat {
   woodscape,
   orb_slam,
   depthai,
+  ros,
 };
 
 struct Calibration {
@@ -34,12 +35,13 @@ struct Calibration {
 
 /// Reads a Kalibr camchain YAML, a Basalt JSON, an OpenCV FileStorage (YAML, XML or JSON; fisheye
 /// stereo or omnidir), EuRoC's sensor.yaml (one camera's, or the folder that has cam0/sensor.yaml,
-/// cam1/sensor.yaml, ... or has them in mav0), a camera of CamOdoCal, OCamCalib or WoodScape, a
-/// configuration of VINS-Fusion or MultiCol-SLAM (with the cameras that it names), of OmniMVS or
-/// ORB-SLAM3, a calibration of DepthAI, and validates it. Sizes come from the file; an OpenCV file
-/// without an image size takes `image_size` (pixels), and one of another size is refused. The other
-/// formats ignore `image_size`, as each of their cameras has a size of its own. Throws Error naming
-/// the file, the key and the remedy.
+/// cam1/sensor.yaml, ... or has them in mav0), ROS's camera_info (one camera's, or the folder that
+/// has those of all), a camera of CamOdoCal, OCamCalib or WoodScape, a configuration of VINS-Fusion
+/// or MultiCol-SLAM (with the cameras that it names), of OmniMVS or ORB-SLAM3, a calibration of
+/// DepthAI, and validates it. Sizes come from the file; an OpenCV file without an image size takes
+/// `image_size` (pixels), and one of another size is refused. The other formats ignore
+/// `image_size`, as each of their cameras has a size of its own. Throws Error naming the file, the
+/// key and the remedy.
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size = {});
 
 /// A Kalibr camchain (with T_cam_imu where the IMU is known, timeshift_cam_imu where its clock is

@@ -40,6 +40,8 @@ std::string no_form(const View& view, CalibrationFormat format, const std::strin
 Rig read_kalibr(const Document& document);
 Rig read_basalt(const Document& document);
 Rig read_opencv(const Document& document, cv::Size image_size);
+/// Whether it has a camera matrix by one of the names that read_opencv() knows.
+bool has_opencv_matrix(const Document& document);
 
 /// A count that a file states, as of pixels; none where it is no whole number from 1 to a million.
 std::optional<int> whole_number(double value);

@@ -11,6 +11,7 @@
 #include <opencv2/core/persistence.hpp>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -24,6 +25,9 @@ namespace widestereo::calibration {
 namespace {
 
 using Keys = std::initializer_list<const char*>;
+
+/// The first camera's matrix where cameras count from 0.
+constexpr Keys matrix_0 = {"K0", "M0", "cameraMatrix0", "camera_matrix_0"};
 
 /// How many levels OpenCV's parsers find in a text at most: each begins with a bracket, an element
 /// of XML, a key's colon or an item's dash. Those in comments and strings count, too, as parsers
@@ -40,15 +44,30 @@ std::size_t most_levels(std::string_view text) {
   return levels;
 }
 
+/// What OpenCV's parser of YAML needs that others do not: a first line, and lists further in than
+/// their key.
+std::string as_opencv_yaml(const std::string& text) {
+  std::istringstream lines(text);
+  std::string result = "%YAML:1.0\n";
+  for (std::string line; std::getline(lines, line);) {
+    const bool belongs_to_key = line.starts_with(' ') || line.starts_with("- ");
+    result.append(belongs_to_key ? " " : "").append(line).push_back('\n');
+  }
+  return result;
+}
+
 /// The parsers call themselves at each level, until the stack is full.
-const std::string& parsable(const Document& document) {
+std::string parsable(const Document& document) {
   constexpr std::size_t most = 5000;  // 2 MiB of stack at 400 bytes a level
   if (most_levels(document.text) > most) {
     document.fail("It has more than " + std::to_string(most) +
                   " brackets, keys and items, which may be too deep in each other for OpenCV; "
                   "leave only those of the calibration.");
   }
-  return document.text;
+  const std::size_t first = document.text.find_first_not_of(" \t\r\n");
+  const bool is_told = first != std::string::npos &&
+                       std::string_view("{<%").find(document.text[first]) != std::string::npos;
+  return is_told ? document.text : as_opencv_yaml(document.text);
 }
 
 /// A FileStorage whose keys go by several names; numbers in them may begin with 0 or 1.
@@ -58,7 +77,7 @@ class Storage {
       : document_(document),
         file_(parsable(document), cv::FileStorage::READ | cv::FileStorage::MEMORY) {
     if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
-    for (const char* key : {"K0", "M0", "cameraMatrix0", "camera_matrix_0"}) {
+    for (const char* key : matrix_0) {
       begins_with_0_ = begins_with_0_ || !node_of(key).empty();
     }
   }
@@ -135,16 +154,26 @@ class Storage {
   }
   static bool is_number(const cv::FileNode& node) { return node.isReal() || node.isInt(); }
 
-  /// A number, or a list as OpenCV writes a cv::Size, cv::Vec or std::vector; empty otherwise.
+  /// A number, a list as OpenCV writes a cv::Size, cv::Vec or std::vector, or a list of rows as
+  /// others write a matrix; empty otherwise.
   static cv::Mat numbers(const cv::FileNode& node) {
     if (is_number(node)) return cv::Mat(1, 1, CV_64F, cv::Scalar(node.real()));
-    std::vector<double> values;
     if (!node.isSeq()) return {};
+    const bool has_rows = node.size() > 0 && (*node.begin()).isSeq();
+    std::vector<double> values;
+    cv::Mat rows;
     for (const cv::FileNode& element : node) {
-      if (!is_number(element)) return {};
-      values.push_back(element.real());
+      if (has_rows) {
+        const cv::Mat row = element.isSeq() ? numbers(element).t() : cv::Mat();
+        if (row.rows != 1 || (!rows.empty() && row.cols != rows.cols)) return {};
+        rows.push_back(row);
+      } else if (is_number(element)) {
+        values.push_back(element.real());
+      } else {
+        return {};
+      }
     }
-    return cv::Mat(values, true);
+    return has_rows ? rows : cv::Mat(values, true);
   }
 
   /// A damaged header must not make OpenCV allocate gigabytes.
@@ -384,6 +413,20 @@ void set_matrix(Camera& camera, const Document& document, const std::string& wha
   camera.cx = k(0, 2);
   camera.fy = k(1, 1);
   camera.cy = k(1, 2);
+}
+
+bool has_opencv_matrix(const Document& document) {
+  std::istringstream lines(document.text);
+  for (std::string line; std::getline(lines, line);) {
+    for (const Keys keys : {first_matrix, matrix_0}) {
+      for (const std::string key : keys) {
+        if (line.starts_with(key + ":") || line.find('"' + key + '"') != std::string::npos) {
+          return true;
+        }
+      }
+    }
+  }
+  return false;
 }
 
 Rig read_opencv(const Document& document, cv::Size image_size) {

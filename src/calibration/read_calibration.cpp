@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <system_error>
@@ -13,6 +14,7 @@
 #include "calibration/multicol.h"
 #include "calibration/ocam.h"
 #include "calibration/orb_slam.h"
+#include "calibration/ros.h"
 #include "calibration/woodscape.h"
 #include "geometry/validation.h"
 #include "text/text_input.h"
@@ -121,6 +123,12 @@ void require_no_part_of_a_model(const std::filesystem::path& folder) {
               ".txt is missing; give the folder that has cameras and images.");
 }
 
+bool is_too_large(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+  return !error && bytes > largest_mebibytes << 20;
+}
+
 Document load(const std::filesystem::path& path) {
   std::error_code error;
   const std::filesystem::file_type type = std::filesystem::status(path, error).type();
@@ -132,7 +140,7 @@ Document load(const std::filesystem::path& path) {
                 "); check the permissions of its folder.");
   }
   const bool is_file = type == std::filesystem::file_type::regular;
-  if (is_file && std::filesystem::file_size(path, error) > largest_mebibytes << 20) {
+  if (is_file && is_too_large(path)) {
     throw Error(path.string() + " is too large for a calibration file (" +
                 std::to_string(largest_mebibytes) + " MiB).");
   }
@@ -151,10 +159,27 @@ Document load(const std::filesystem::path& path) {
   }
   if (!is_file) {
     throw Error(path.string() +
-                " is not a file; give a calibration file, a folder with cam0/sensor.yaml or, for "
-                "images that it has, a COLMAP model, the folder that holds cameras.bin or .txt.");
+                " is not a file; give a calibration file, a folder with cam0/sensor.yaml or ROS's "
+                "camera_info files or, for images that it has, a COLMAP model, the folder that "
+                "holds cameras.bin or .txt.");
   }
   return {path, TextInput(path).rest()};
+}
+
+/// What a folder has of ROS's cameras, by name.
+std::vector<std::filesystem::path> ros_files(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error) || is_sfm_model(folder)) return files;
+  std::filesystem::directory_iterator entry(folder, error);
+  for (; entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    const std::filesystem::path& file = entry->path();
+    const bool is_yaml = file.extension() == ".yaml" || file.extension() == ".yml";
+    if (!is_yaml || !entry->is_regular_file(error) || is_too_large(file)) continue;
+    if (is_ros(load(file))) files.push_back(file);
+  }
+  std::ranges::sort(files);
+  return files;
 }
 
 CalibrationFormat format_of(const Document& document) {
@@ -166,6 +191,7 @@ CalibrationFormat format_of(const Document& document) {
   if (is_woodscape(document)) return CalibrationFormat::woodscape;
   if (is_orb_slam(document)) return CalibrationFormat::orb_slam;
   if (is_depthai(document)) return CalibrationFormat::depthai;
+  if (is_ros(document)) return CalibrationFormat::ros;
   if (is_vins(document)) return CalibrationFormat::vins;
   // Configurations of VINS-Mono are a camera of CamOdoCal with more keys, some of them matrices.
   if (is_camodocal(document)) return CalibrationFormat::camodocal;
@@ -174,16 +200,21 @@ CalibrationFormat format_of(const Document& document) {
   }
   const bool is_json = document.text[first] == '{';
   // Camchains may have been written as JSON.
-  if (is_json && !document.contains("\"cam0\"") && !document.contains("cam0:")) {
-    return CalibrationFormat::basalt;
+  const bool has_cam0 = document.contains("\"cam0\"") || document.contains("cam0:");
+  if (is_json && !has_cam0) {
+    return !document.contains("\"value0\"") && has_opencv_matrix(document)
+               ? CalibrationFormat::opencv
+               : CalibrationFormat::basalt;
   }
   if (is_json || document.contains("cam0:")) return CalibrationFormat::kalibr;
   if (document.contains("T_BS")) return CalibrationFormat::euroc;
   if (document.contains("camera_model")) return CalibrationFormat::kalibr;
+  if (has_opencv_matrix(document)) return CalibrationFormat::opencv;
   document.fail(
       "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
       "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a camera of CamOdoCal, OCamCalib or "
-      "WoodScape, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI.");
+      "WoodScape, a camera_info of ROS, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM "
+      "or DepthAI.");
 }
 
 }  // namespace
@@ -192,14 +223,16 @@ CalibrationFormat format_of(const Document& document) {
 Calibration read_calibration(const std::filesystem::path& path, cv::Size image_size) {
   using namespace calibration;
   Calibration result;
-  const std::vector<std::filesystem::path> sensor_files = euroc_files(path);
   const auto load_noted = [&result](const std::filesystem::path& file) {
     result.files.push_back(file);
     return load(file);
   };
+  const std::vector<std::filesystem::path> sensor_files = euroc_files(path);
+  std::vector<std::filesystem::path> files = sensor_files;
+  if (files.empty()) files = ros_files(path);
+  if (files.empty()) files = {path};
   std::vector<Document> documents;
-  if (sensor_files.empty()) documents.push_back(load_noted(path));
-  for (const std::filesystem::path& file : sensor_files) documents.push_back(load_noted(file));
+  for (const std::filesystem::path& file : files) documents.push_back(load_noted(file));
   result.format = sensor_files.empty() ? format_of(documents[0]) : CalibrationFormat::euroc;
   switch (result.format) {
     case CalibrationFormat::kalibr:
@@ -237,6 +270,9 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
       break;
     case CalibrationFormat::depthai:
       result.rig = read_depthai(documents[0]);
+      break;
+    case CalibrationFormat::ros:
+      result.rig = read_ros(documents);
       break;
   }
   validate(result.rig, path.string());

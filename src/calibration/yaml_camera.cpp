@@ -117,19 +117,25 @@ std::vector<double> YamlCamera::numbers(const YAML::Node& list, const char* key)
   return values;
 }
 
+YAML::Node YamlCamera::list(const char* key) const {
+  const YAML::Node node = node_[key];
+  const YAML::Node values = node && node.IsMap() ? node["data"] : node;
+  return values && values.IsSequence() ? values : YAML::Node();
+}
+
 std::vector<double> YamlCamera::numbers(const char* key) const {
-  const YAML::Node list = node_[key];
-  if (!list || !list.IsSequence()) fail(std::string("The key ") + key + " must list numbers.");
-  return numbers(list, key);
+  const YAML::Node values = list(key);
+  if (!values.IsSequence()) fail(std::string("The key ") + key + " must list numbers.");
+  return numbers(values, key);
 }
 
 std::vector<double> YamlCamera::numbers(const char* key, std::size_t count) const {
-  const YAML::Node list = node_[key];
-  if (count == 0 && list && list.IsNull()) return {};
-  if (!list || !list.IsSequence() || list.size() < count) {
+  const YAML::Node of_key = list(key);
+  if (count == 0 && has(key) && node_[key].IsNull()) return {};
+  if (!of_key.IsSequence() || of_key.size() < count) {
     fail(std::string("The key ") + key + " must list " + std::to_string(count) + " numbers.");
   }
-  std::vector<double> values = numbers(list, key);
+  std::vector<double> values = numbers(of_key, key);
   if (std::any_of(values.begin() + static_cast<long>(count), values.end(),
                   [](double value) { return value != 0; })) {
     fail(std::string("The key ") + key + " lists " + std::to_string(values.size()) +
@@ -165,8 +171,8 @@ Eigen::Matrix3d YamlCamera::matrix(const char* key) const {
 Eigen::Isometry3d YamlCamera::motion(const char* key) const {
   const YAML::Node node = node_[key];
   std::vector<double> values;
-  if (node && node.IsMap() && node["data"] && node["data"].IsSequence()) {
-    values = numbers(node["data"], key);
+  if (node && node.IsMap() && list(key).IsSequence()) {
+    values = numbers(list(key), key);
   } else if (node && node.IsSequence() && node.size() >= 3) {
     values = rows(node, 4, key, "a 4x4 matrix");
   } else {

@@ -35,6 +35,7 @@ class YamlCamera {
   int side(const char* key) const;
   /// Of both sides, in the file's order.
   std::vector<int> sides(const char* key) const;
+  /// A list, or the data of a matrix as OpenCV and ROS write them.
   std::vector<double> numbers(const char* key) const;
   /// Surplus numbers may only be zeros: what another one means would be lost.
   std::vector<double> numbers(const char* key, std::size_t count) const;
@@ -45,6 +46,8 @@ class YamlCamera {
  private:
   [[noreturn]] void fail(const std::string& what) const;
   int side(double value, const char* key) const;
+  /// A list of that key, also one that is the data of a matrix; null if there is none.
+  YAML::Node list(const char* key) const;
   std::vector<double> numbers(const YAML::Node& list, const char* key) const;
   /// The numbers of rows of `columns` each, one row after the other.
   std::vector<double> rows(const YAML::Node& list, std::size_t columns, const char* key,

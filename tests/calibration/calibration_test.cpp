@@ -403,6 +403,41 @@ TEST(OpenCv, MayCountCamerasFromZero) {
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(rig.views[i].camera, expected.views[i].camera);
 }
 
+/// As programs in Python write its matrices by json and yaml.
+TEST(OpenCv, ReadsListsOfRows) {
+  const TemporaryFolder folder;
+  const std::string rows = "[[300, 0, 320], [0, 301, 240], [0, 0, 1]]";
+  const std::string json =
+      R"({"image_size": [640, 480], "K1": )" + rows + R"(, "D1": [[0.01], [0.02], [0], [1e-05]],)" +
+      R"("K2": )" + rows +
+      R"(, "D2": [0.01, 0.02, 0, 0], "R": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], )" +
+      R"("T": [[-0.1], [0], [0]]})";
+  const std::string flow =
+      "image_size: [640, 480]\nK1: " + rows +
+      "\nD1: [[0.01], [0.02], [0.0], [1.0e-05]]\nK2: " + rows +
+      "\nD2: [0.01, 0.02, 0, 0]\nR: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]\n";
+  const std::string block =
+      "D:\n- - 0.01\n- - 0.02\n- - 0.0\n- - 1.0e-05\nK:\n- - 300.0\n  - 0.0\n  - 320.0\n- - 0.0\n"
+      "  - 301.0\n  - 240.0\n- - 0.0\n  - 0.0\n  - 1.0\nimage_size:\n- 640\n- 480\n";
+  for (const auto& [name, text] :
+       {std::pair("rig.json", json), std::pair("rig.yaml", flow), std::pair("one.yaml", block)}) {
+    SCOPED_TRACE(name);
+    const Calibration c = read_calibration(folder.write(name, text));
+    EXPECT_EQ(c.format, CalibrationFormat::opencv);
+    const Camera& camera = c.rig.views.at(0).camera;
+    EXPECT_EQ(camera.model, CameraModel::kannala_brandt);
+    EXPECT_EQ(camera.fy, 301);
+    EXPECT_EQ(camera.cx, 320);
+    EXPECT_EQ(camera.k4, 1e-5);
+    EXPECT_EQ(camera.width, 640);
+    ASSERT_EQ(c.rig.views.size(), text == block ? 1u : 2u);
+    if (text == block) continue;
+    EXPECT_NEAR(c.rig.views[1].world_from_camera.translation().x(), 0.1, 1e-12);
+  }
+  const std::string ragged = replaced(json, "[0, 301, 240]", "[0, 301]");
+  EXPECT_NE(error_of(folder.write("ragged.json", ragged)).find("camera matrix"), std::string::npos);
+}
+
 TEST(OpenCv, RefusesSizesThatAreNotWhole) {
   const TemporaryFolder folder;
   const std::string list =
