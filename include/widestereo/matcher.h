@@ -150,7 +150,8 @@ class Matcher {
 
   /// The same for the next frame of a sequence, from the previous frame's planes instead of from
   /// none (Options::warm_iterations): a fraction of the work where most of the scene was seen
-  /// before. The first time, drivers of Vulkan compile what it needs besides. Throws Error where there are no such planes, and where match() does.
+  /// before. The first time, drivers of Vulkan compile what it needs besides. Throws Error where
+  /// there are no such planes, and where match() does.
   StereoResult match_next(const std::vector<cv::Mat>& images, const WarmStart& start,
                           const Progress& progress = {});
 
