@@ -16,7 +16,7 @@ void report_left_out(std::size_t left_out, std::size_t frames, const std::string
       "; the first is " + first + ".");
 }
 
-void FrameSettings::add_to(CLI::App& command) {
+void FrameSettings::add_to(CLI::App& command, const std::string& skipped_too) {
   const std::string group = "Frames";
   command
       .add_option("--folders", folders,
@@ -46,7 +46,7 @@ void FrameSettings::add_to(CLI::App& command) {
       ->group(group);
   command
       .add_flag("--skip-incomplete", skip_incomplete,
-                "Leave out frames that a camera, or --poses, lacks")
+                "Leave out frames that a camera, or --poses, lacks" + skipped_too)
       ->group(group);
 }
 

@@ -33,10 +33,11 @@ struct FrameSettings {
   bool skip_incomplete = false;
 
   /// Adds --folders, --first, --count, --step, --time-tolerance and --skip-incomplete.
-  void add_to(CLI::App& command);
-  bool given() const {
-    return !folders.empty() || first > 0 || count > 0 || step > 1 || time_tolerance > 0 ||
-           skip_incomplete;
+  /// `skipped_too`: what else the last one leaves out, in its help.
+  void add_to(CLI::App& command, const std::string& skipped_too = {});
+  /// Whether any but the last one were given.
+  bool choose_frames() const {
+    return !folders.empty() || first > 0 || count > 0 || step > 1 || time_tolerance > 0;
   }
   /// An image of the first of some cameras.
   std::filesystem::path example(const std::string& dataset, int first_camera) const;

@@ -50,7 +50,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
       "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
       "the pixel");
   poses.add_to(command, "data sets of more than one frame need it", "Data sets");
-  frames.add_to(command);
+  frames.add_to(command, ", and a model's images that are missing");
   size.add_to(command);
   white_level.add_to(command);
 }
@@ -81,8 +81,29 @@ PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   return posed;
 }
 
+std::shared_ptr<const ws::SfmModel> PosedImageSettings::model_of_images() const {
+  const auto model = std::make_shared<ws::SfmModel>(rig.calibration);
+  const std::size_t all = model->names().size();
+  Images missing;
+  for (std::size_t i = 0; i < all; ++i) {
+    if (!fs::exists(model->file_of(i, images))) missing.push_back(i);
+  }
+  if (missing.empty()) return model;
+  const std::string first = model->file_of(missing.front(), images).string();
+  const std::string count = std::to_string(missing.size()) + " of " + std::to_string(all);
+  if (missing.size() == all || !frames.skip_incomplete) {
+    throw ws::Error(first + " is missing (" + count + " images in " + rig.calibration +
+                    " are); give the folder that their paths begin in" +
+                    (missing.size() == all ? "." : ", or leave them out by --skip-incomplete."));
+  }
+  say(count + " images in " + rig.calibration + " are missing and left out; the first is " + first +
+      ".");
+  model->leave_out(missing);
+  return model;
+}
+
 PosedImages PosedImageSettings::of_model() const {
-  if (poses.given() || frames.given() || !rig.views.empty()) {
+  if (poses.given() || frames.choose_frames() || !rig.views.empty()) {
     throw ws::Error(
         "--poses, --views and the options of frames are for data sets, but " + rig.calibration +
         " is a COLMAP model or transforms.json, which has images and poses; leave them out.");
@@ -91,19 +112,13 @@ PosedImages PosedImageSettings::of_model() const {
     throw ws::Error("--mask is for all images of " + rig.calibration +
                     "; give one, or a folder of masks by --masks.");
   }
-  const auto model = std::make_shared<const ws::SfmModel>(rig.calibration);
+  const std::shared_ptr<const ws::SfmModel> model = model_of_images();
   PosedImages posed;
   posed.in_metres = false;
   Images all;
   ws::Rig rig_of_all;
   for (std::size_t i = 0; i < model->names().size(); ++i) {
     posed.files.push_back(model->file_of(i, images));
-    if (!fs::exists(posed.files.back())) {
-      throw ws::Error(posed.files.back().string() +
-                      " is missing; give the folder that the paths of the " +
-                      std::to_string(model->names().size()) + " images in " + rig.calibration +
-                      " begin in, or correct them.");
-    }
     rig_of_all.views.push_back(model->calibrated({i}).rig.views.front());
     all.push_back(i);
   }

@@ -59,6 +59,8 @@ struct PosedImageSettings {
 
  private:
   PosedImages of_model() const;
+  /// Without those whose files are missing, where they may be skipped.
+  std::shared_ptr<const widestereo::SfmModel> model_of_images() const;
   PosedImages of_trajectory() const;
   /// Which images have a mask of their own.
   std::vector<bool> apply_masks(PosedImages& images) const;

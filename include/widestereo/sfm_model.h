@@ -44,6 +44,10 @@ class SfmModel {
   /// that they will do as names within a folder of results.
   const std::vector<std::string>& names() const;
 
+  /// Forgets images, as such whose files are missing: the others are numbered anew. Throws Error
+  /// for numbers of no image, and where none would be left.
+  void leave_out(const std::vector<std::size_t>& images);
+
   /// Where an image lies, by its path in the model, which begins in `folder`. Throws Error for
   /// numbers of no image.
   std::filesystem::path file_of(std::size_t image, const std::filesystem::path& folder) const;

@@ -132,6 +132,24 @@ class SfmModel::Implementation {
 
   const std::vector<std::string>& names() const { return names_; }
 
+  void leave_out(const std::vector<std::size_t>& images) {
+    std::vector<bool> is_left(images_.size(), true);
+    for (const std::size_t number : images) {
+      image_at(number);
+      is_left[number] = false;
+    }
+    const auto left = std::ranges::count(is_left, true);
+    if (left == 0) throw Error("No image of " + path_.string() + " would be left; keep one.");
+    std::vector<ColmapImage> all = std::exchange(images_, {});
+    std::vector<std::string> names = std::exchange(names_, {});
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!is_left[i]) continue;
+      images_.push_back(std::move(all[i]));
+      names_.push_back(std::move(names[i]));
+    }
+    read_points();
+  }
+
   fs::path file_of(std::size_t number, const fs::path& folder) const {
     return folder / image_at(number).name;
   }
@@ -222,6 +240,7 @@ class SfmModel::Implementation {
       centres.push_back(image.camera_from_world.inverse().translation());
     }
     std::vector<ObservedPoint> points;
+    positions_.clear();
     const fs::path file = colmap_file(path_, "points3D");
     if (!file.empty()) {
       std::unordered_map<std::uint64_t, std::vector<std::size_t>> observers;
@@ -255,6 +274,10 @@ SfmModel::SfmModel(SfmModel&&) noexcept = default;
 SfmModel& SfmModel::operator=(SfmModel&&) noexcept = default;
 
 const std::vector<std::string>& SfmModel::names() const { return implementation_->names(); }
+
+void SfmModel::leave_out(const std::vector<std::size_t>& images) {
+  implementation_->leave_out(images);
+}
 
 fs::path SfmModel::file_of(std::size_t image, const fs::path& folder) const {
   return implementation_->file_of(image, folder);

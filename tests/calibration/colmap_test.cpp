@@ -334,6 +334,28 @@ TEST_F(Colmap, GroupsAreOfImagesThatSeeTheSame) {
   EXPECT_EQ(SfmModel(folder_.path()).selection().groups(3).size(), 8U);
 }
 
+TEST_F(Colmap, WhatIsLeftOutIsForgotten) {
+  write_binary();
+  std::string points = bytes(std::uint64_t{2});
+  for (const std::uint64_t number : {5, 6}) {
+    points += bytes(number) + doubles(1, 2, 30) + "rgb" + doubles(0.5) + bytes(std::uint64_t{0});
+  }
+  folder_.write("points3D.bin", points);
+  SfmModel model(folder_.path());
+  ASSERT_EQ(model.names(), (std::vector<std::string>{"b.png", "left/a b.png", "left/b.png"}));
+  ASSERT_TRUE(model.has_points());
+  model.leave_out({0});
+  EXPECT_EQ(model.names(), (std::vector<std::string>{"left/a b.png", "left/b.png"}));
+  EXPECT_EQ(model.file_of(1, "/data"), fs::path("/data/left/b.png"));
+  EXPECT_EQ(model.calibrated({0}).rig.views[0].camera.model, CameraModel::kannala_brandt);
+  EXPECT_TRUE(model.has_points());
+  EXPECT_THROW(model.leave_out({2}), Error);
+  model.leave_out({0});
+  EXPECT_EQ(model.names(), std::vector<std::string>{"left/b.png"});
+  EXPECT_FALSE(model.has_points()) << "which none of those left observes";
+  EXPECT_THROW(model.leave_out({0}), Error);
+}
+
 TEST_F(Colmap, ReadsBinaryPoints) {
   write_binary(
       cameras_binary(), bytes(std::uint64_t{1}) + bytes(std::uint32_t{4}) +

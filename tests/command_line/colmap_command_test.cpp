@@ -422,6 +422,25 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
+TEST_F(ReconstructCommand, ImagesThatAreMissingMayBeLeftOut) {
+  std::filesystem::remove(folder_ / "images/away.png");
+  expect_error(reconstruct(), "away.png is missing (1 of 3 images in " + file("model") + " are)");
+  expect_error(reconstruct(), "leave them out by --skip-incomplete");
+  const Outcome outcome = run(reconstruct() + "--skip-incomplete --min-confidence 0");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("1 of 3 images in " + file("model") + " are missing and left out"),
+            std::string::npos)
+      << outcome.output;
+  EXPECT_EQ(record()["images"].size(), 2u);
+  // What was left out first by name has no part in what the others are.
+  EXPECT_EQ(record()["images"][0]["name"], "left.png");
+  EXPECT_EQ(options_of("out/left.png")["min_distance"], 0.75);
+  std::filesystem::remove_all(folder_ / "images");
+  expect_error(reconstruct("other") + "--skip-incomplete",
+               "is missing (3 of 3 images in " + file("model") +
+                   " are); give the folder that their paths begin in.");
+}
+
 TEST_F(ReconstructCommand, OneEndOfTheRangeWillDo) {
   // In units of a centimetre.
   replace_in_model("model/images.txt", "-0.1 0 0", "-10 0 0");
