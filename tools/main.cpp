@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
-#include <sstream>
+#include <string>
+#include <vector>
 
 #include "commands.h"
 #include "option_checks.h"
@@ -23,16 +25,36 @@ void end_options_after_a_word(CLI::App& app) {
   for (CLI::App* command : app.get_subcommands(nullptr)) end_options_after_a_word(*command);
 }
 
-/// What is wrong with the word in place of a command, empty if nothing is.
-std::string unknown_command(const CLI::App& app) {
+/// The command that the words name, or the group that one should be of.
+const CLI::App& parsed_command(const CLI::App& app) {
   const std::vector<CLI::App*> parsed = app.get_subcommands();
-  if (!parsed.empty()) return unknown_command(*parsed.front());
-  if (app.get_require_subcommand_min() == 0 || app.remaining().empty()) return "";
+  return parsed.empty() ? app : parsed_command(*parsed.front());
+}
+
+std::string help_of(const CLI::App& command) {
   std::string path;
-  for (const CLI::App* group = &app; group->get_parent() != nullptr; group = group->get_parent()) {
+  for (const CLI::App* group = &command; group->get_parent() != nullptr;
+       group = group->get_parent()) {
     path = " " + group->get_name() + path;
   }
-  return app.remaining().front() + " is no command; `widestereo" + path + " --help` lists them.";
+  return "`widestereo" + path + " --help`";
+}
+
+/// What is wrong with the first word that is neither a command nor an option nor its value; empty
+/// if nothing is.
+std::string unknown_word(const CLI::App& app) {
+  const CLI::App& command = parsed_command(app);
+  const std::vector<std::string> words = command.remaining();
+  if (words.empty()) return "";
+  const auto is_option = [](const std::string& word) { return word.starts_with('-'); };
+  if (command.get_require_subcommand_min() > 0 && !is_option(words.front())) {
+    return words.front() + " is no command; " + help_of(command) + " lists them.";
+  }
+  const auto option = std::ranges::find_if(words, is_option);
+  if (option != words.end()) {
+    return *option + " is no option; " + help_of(command) + " lists them.";
+  }
+  return words.front() + " is a word too many; leave it out.";
 }
 
 /// The option that was given more than once though it takes one word, empty if none was.
@@ -50,10 +72,11 @@ int report_lack_of_memory() {
 }
 
 int report(const CLI::App& app, const CLI::ParseError& error) {
-  std::ostringstream message;
-  const int exit_code = app.exit(error, std::cout, message);
-  std::fputs(message.str().c_str(), stderr);
-  return exit_code;
+  if (error.get_exit_code() == 0) return app.exit(error, std::cout);
+  const std::string unknown = unknown_word(app);
+  say(unknown.empty() ? error.what() + ("; " + help_of(parsed_command(app)) + " tells more.")
+                      : unknown);
+  return error.get_exit_code();
 }
 
 int run(int argc, char** argv) {
@@ -75,11 +98,6 @@ int run(int argc, char** argv) {
   check_words_of(app);
   try {
     app.parse(argc, argv);
-  } catch (const CLI::RequiredError& error) {
-    const std::string unknown = unknown_command(app);
-    if (unknown.empty()) return report(app, error);
-    say(unknown);
-    return error.get_exit_code();
   } catch (const CLI::ArgumentMismatch& error) {
     const std::string repeated = repeated_option(app);
     if (repeated.empty()) return report(app, error);
@@ -89,6 +107,8 @@ int run(int argc, char** argv) {
     // Words have been found to be such numbers, or true or false: just a number's range is left.
     say(std::string(error.what()) + "; it is too large, or negative where it may not be.");
     return error.get_exit_code();
+  } catch (const CLI::RuntimeError& error) {
+    return error.get_exit_code();  // of a command that has said why
   } catch (const CLI::ParseError& error) {
     return report(app, error);
   } catch (const widestereo::Error& error) {

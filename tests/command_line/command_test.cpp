@@ -500,7 +500,7 @@ TEST_F(FewerBits, AreStretchedByEveryCommand) {
   }
 }
 
-TEST_F(Command, UnknownCommandsAreNamed) {
+TEST_F(Command, UnknownWordsAreNamed) {
   const auto expect = [](const std::string& arguments, const std::string& message) {
     const Outcome outcome = run(arguments);
     EXPECT_NE(outcome.exit_code, 0);
@@ -510,6 +510,13 @@ TEST_F(Command, UnknownCommandsAreNamed) {
   expect("foo l.png -o x", "foo is no command; `widestereo --help` lists them.");
   expect("calibration foo x.yaml",
          "foo is no command; `widestereo calibration --help` lists them.");
+  expect("--foo", "--foo is no option; `widestereo --help` lists them.");
+  const std::string no_option = "--outpt is no option; `widestereo depth --help` lists them.";
+  expect("depth l.png r.png -c x.yaml --outpt x", no_option);  // rather than that --output lacks
+  expect("depth l.png r.png -c x.yaml -o x --outpt x", no_option);
+  expect("demo extra", "extra is a word too many; leave it out.");
+  expect("demo --size 2",
+         "--size: Value 2 not in range 64 to 4096; `widestereo demo --help` tells more.");
   EXPECT_EQ(run("foo --help").exit_code, 0);
 }
 
