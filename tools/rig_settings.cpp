@@ -14,6 +14,16 @@
 
 namespace ws = widestereo;
 
+namespace {
+
+/// One of the files of a rig in formats that have one for each camera.
+bool is_of_one_camera(const ws::Calibration& calibration) {
+  return calibration.files.size() == 1 && (calibration.format == ws::CalibrationFormat::euroc ||
+                                           calibration.format == ws::CalibrationFormat::ros);
+}
+
+}  // namespace
+
 void RigSettings::add_whole_rig_to(CLI::App& command, const std::string& or_other) {
   command.add_option("-c,--calibration", calibration, calibration_formats + or_other)->required();
   add_fields_of_view_to(command);
@@ -41,7 +51,8 @@ void RigSettings::add_to(CLI::App& command, const std::string& or_other, const s
 }
 
 ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) const {
-  const ws::Rig all = ws::read_calibration(calibration, size).rig;
+  const ws::Calibration read = ws::read_calibration(calibration, size);
+  const ws::Rig& all = read.rig;
   std::vector<int> chosen = views;
   if (chosen.empty()) {
     for (std::size_t i = 0; i < image_count; ++i) chosen.push_back(static_cast<int>(i));
@@ -55,9 +66,11 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
   for (const int view : chosen) {
     if (view < 0 || view >= static_cast<int>(all.views.size())) {
       throw ws::Error(calibration + " has " + std::to_string(all.views.size()) +
-                      " camera(s); there is no camera " + std::to_string(view) +
-                      ". Give one image for each camera, choose cameras with --views, or give the "
-                      "--poses of a camera that moved.");
+                      " camera(s); there is no camera " + std::to_string(view) + ". " +
+                      (is_of_one_camera(read)
+                           ? "Give the folder that has the files of all cameras."
+                           : "Give one image for each camera, choose cameras with --views, or give "
+                             "the --poses of a camera that moved."));
     }
     rig.views.push_back(all.views[static_cast<std::size_t>(view)]);
   }

@@ -23,7 +23,8 @@ struct RigSettings {
 
   /// What read_calibration() reads.
   static constexpr const char* calibration_formats =
-      "Kalibr camchain, Basalt JSON, OpenCV file, EuRoC folder, camera of CamOdoCal, OCamCalib or "
+      "Kalibr camchain, Basalt JSON, OpenCV file, EuRoC or ROS folder, camera of CamOdoCal, "
+      "OCamCalib or "
       "WoodScape, rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI";
   /// What else --calibration may be where images with poses are taken, too.
   static constexpr const char* or_model =

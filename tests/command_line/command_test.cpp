@@ -500,6 +500,19 @@ TEST_F(FewerBits, AreStretchedByEveryCommand) {
   }
 }
 
+TEST_F(Command, ACameraThatIsMissingMayBeInTheFolder) {
+  const std::string pair =
+      "depth " + file("left.png") + " " + file("right.png") + " -o " + file("out") + " -c ";
+  folder_.write(
+      "left.yaml",
+      "image_width: 96\nimage_height: 96\ncamera_matrix: {data: [30, 0, 48, 0, 30, 48, 0, 0, 1]}\n"
+      "distortion_model: equidistant\ndistortion_coefficients: {data: [0, 0, 0, 0]}\n"
+      "rectification_matrix: {data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
+      "projection_matrix: {data: [30, 0, 48, 0, 0, 30, 48, 0, 0, 0, 1, 0]}\n");
+  expect_error(pair + file("left.yaml"), "Give the folder that has the files of all cameras");
+  expect_error(pair + file("calib.yaml") + " --views 0,2", "there is no camera 2. Give one image");
+}
+
 TEST_F(Command, UnknownWordsAreNamed) {
   const auto expect = [](const std::string& arguments, const std::string& message) {
     const Outcome outcome = run(arguments);
