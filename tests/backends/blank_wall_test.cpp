@@ -75,7 +75,7 @@ TEST(BlankWalls, AreFoundFromTheirEdgesAndNotCertain) {
 }
 
 TEST(BlankWalls, OfLargeImagesAreFoundByMoreLevels) {
-  const RenderedPair pair = render_blank_room(480);
+  const RenderedPair pair = render_blank_room(384);
   Options options = Options::preset_named("fast");
   options.levels = 4;
   const double wrong = wrong_by(1, match(pair, options), pair);
