@@ -63,15 +63,20 @@ cv::Mat with_strip(const cv::Mat& picture, int height) {
   return result;
 }
 
+int thickness_of_text(double scale) { return scale > 0.8 ? 2 : 1; }
+
+cv::Size text_size(const std::string& text, double scale) {
+  int base = 0;
+  return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness_of_text(scale), &base);
+}
+
 void put_text(cv::Mat& picture, const std::string& text, cv::Point at, double scale,
               double align = 0) {
-  const int thickness = scale > 0.8 ? 2 : 1;
-  int base = 0;
-  const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, &base);
+  const cv::Size size = text_size(text, scale);
   const int x = std::clamp(at.x - static_cast<int>(align * size.width), 2,
                            std::max(2, picture.cols - size.width - 2));
-  cv::putText(picture, text, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, ink, thickness,
-              cv::LINE_AA);
+  cv::putText(picture, text, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, ink,
+              thickness_of_text(scale), cv::LINE_AA);
 }
 
 std::string metres(double value) {
@@ -217,15 +222,22 @@ cv::Mat with_scalar_legend(const cv::Mat& picture, double low, double high) {
 cv::Mat with_reason_legend(const cv::Mat& picture) {
   const double scale = text_scale(picture);
   const int line = static_cast<int>(30 * scale);
+  const double text = scale * 0.7;
+  int widest = 0;
+  for (const auto& reason : named_reasons) {
+    widest = std::max(widest, text_size(reason.name, text).width);
+  }
   const int count = static_cast<int>(named_reasons.size());
-  const int rows = (count + 3) / 4;
+  const int columns = std::clamp(picture.cols / (line + widest + line / 4), 1, 4);
+  const int rows = (count + columns - 1) / columns;
   cv::Mat result = with_strip(picture, (2 + 5 * rows) * line / 4);
-  const int column = result.cols / 4;
+  const int column = result.cols / columns;
   for (int i = 0; i < count; ++i) {
-    const cv::Point at(line / 2 + i % 4 * column, picture.rows + line / 2 + i / 4 * line * 5 / 4);
+    const cv::Point at(line / 2 + i % columns * column,
+                       picture.rows + line / 2 + i / columns * line * 5 / 4);
     const cv::Rect box(at.x, at.y, line * 2 / 3, line * 2 / 3);
     cv::rectangle(result, box, cv::Scalar(reason_colours[i]), cv::FILLED);
-    put_text(result, named_reasons[i].name, {at.x + line, at.y + line * 2 / 3}, scale * 0.7);
+    put_text(result, named_reasons[i].name, {at.x + line, at.y + line * 2 / 3}, text);
   }
   return result;
 }

@@ -205,6 +205,25 @@ TEST(Pictures, SheetHoldsAllPanels) {
   EXPECT_THROW(panel_sheet({{"a", grey}}, 0), Error);
 }
 
+/// Each reason has a box of its colour, which no name of another one may cover.
+TEST(Pictures, LegendsOfReasonsFitNarrowPictures) {
+  for (const int cols : {100, 192, 256, 320, 512}) {
+    const cv::Mat with = with_reason_legend(cv::Mat(10, cols, CV_8UC3, cv::Scalar::all(255)));
+    cv::Mat grey;
+    cv::cvtColor(with.rowRange(10, with.rows), grey, cv::COLOR_BGR2GRAY);
+    cv::Mat labels, stats, centres;
+    const int parts = cv::connectedComponentsWithStats(grey < 255, labels, stats, centres);
+    int boxes = 0;
+    for (int i = 1; i < parts; ++i) {
+      const int width = stats.at<int>(i, cv::CC_STAT_WIDTH);
+      const int height = stats.at<int>(i, cv::CC_STAT_HEIGHT);
+      boxes +=
+          width == height && width >= 6 && stats.at<int>(i, cv::CC_STAT_AREA) == width * height;
+    }
+    EXPECT_EQ(boxes, static_cast<int>(named_reasons.size())) << cols;
+  }
+}
+
 TEST(Pictures, TakeImagesOfAnySize) {
   for (const int cols : {1, 2, 3, 8, 9, 10, 11, 12, 63, 64, 65}) {
     for (const int rows : {1, 2, 9, 70}) {
