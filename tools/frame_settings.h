@@ -36,7 +36,7 @@ struct FrameSettings {
   /// `skipped_too`: what else the last one leaves out, in its help.
   void add_to(CLI::App& command, const std::string& skipped_too = {});
   /// Whether any but the last one were given.
-  bool choose_frames() const {
+  bool are_chosen() const {
     return !folders.empty() || first > 0 || count > 0 || step > 1 || time_tolerance > 0;
   }
   /// An image of the first of some cameras.

@@ -103,7 +103,7 @@ std::shared_ptr<const ws::SfmModel> PosedImageSettings::model_of_images() const 
 }
 
 PosedImages PosedImageSettings::of_model() const {
-  if (poses.given() || frames.choose_frames() || !rig.views.empty()) {
+  if (poses.given() || frames.are_chosen() || !rig.views.empty()) {
     throw ws::Error(
         "--poses, --views and the options of frames are for data sets, but " + rig.calibration +
         " is a COLMAP model or transforms.json, which has images and poses; leave them out.");

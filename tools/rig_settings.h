@@ -24,8 +24,7 @@ struct RigSettings {
   /// What read_calibration() reads.
   static constexpr const char* calibration_formats =
       "Kalibr camchain, Basalt JSON, OpenCV file, EuRoC or ROS folder, camera of CamOdoCal, "
-      "OCamCalib or "
-      "WoodScape, rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI";
+      "OCamCalib or WoodScape, rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI";
   /// What else --calibration may be where images with poses are taken, too.
   static constexpr const char* or_model =
       ", or folder of a COLMAP model, or transforms.json, whose unit distances then have";

@@ -416,13 +416,11 @@ void set_matrix(Camera& camera, const Document& document, const std::string& wha
 }
 
 bool has_opencv_matrix(const Document& document) {
-  std::istringstream lines(document.text);
-  for (std::string line; std::getline(lines, line);) {
-    for (const Keys keys : {first_matrix, matrix_0}) {
-      for (const std::string key : keys) {
-        if (line.starts_with(key + ":") || line.find('"' + key + '"') != std::string::npos) {
-          return true;
-        }
+  const std::string lines = "\n" + document.text;
+  for (const Keys keys : {first_matrix, matrix_0}) {
+    for (const std::string key : keys) {
+      for (const std::string& written : {"\n" + key + ":", "\"" + key + "\""}) {
+        if (lines.find(written) != std::string::npos) return true;
       }
     }
   }

@@ -167,19 +167,20 @@ Document load(const std::filesystem::path& path) {
 }
 
 /// What a folder has of ROS's cameras, by name.
-std::vector<std::filesystem::path> ros_files(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
+std::vector<Document> ros_documents(const std::filesystem::path& folder) {
+  std::vector<Document> documents;
   std::error_code error;
-  if (!std::filesystem::is_directory(folder, error) || is_sfm_model(folder)) return files;
+  if (!std::filesystem::is_directory(folder, error) || is_sfm_model(folder)) return documents;
   std::filesystem::directory_iterator entry(folder, error);
   for (; entry != std::filesystem::directory_iterator(); entry.increment(error)) {
     const std::filesystem::path& file = entry->path();
     const bool is_yaml = file.extension() == ".yaml" || file.extension() == ".yml";
     if (!is_yaml || !entry->is_regular_file(error) || is_too_large(file)) continue;
-    if (is_ros(load(file))) files.push_back(file);
+    Document document = load(file);
+    if (is_ros(document)) documents.push_back(std::move(document));
   }
-  std::ranges::sort(files);
-  return files;
+  std::ranges::sort(documents, {}, &Document::path);
+  return documents;
 }
 
 CalibrationFormat format_of(const Document& document) {
@@ -228,11 +229,11 @@ Calibration read_calibration(const std::filesystem::path& path, cv::Size image_s
     return load(file);
   };
   const std::vector<std::filesystem::path> sensor_files = euroc_files(path);
-  std::vector<std::filesystem::path> files = sensor_files;
-  if (files.empty()) files = ros_files(path);
-  if (files.empty()) files = {path};
   std::vector<Document> documents;
-  for (const std::filesystem::path& file : files) documents.push_back(load_noted(file));
+  for (const std::filesystem::path& file : sensor_files) documents.push_back(load(file));
+  if (documents.empty()) documents = ros_documents(path);
+  if (documents.empty()) documents.push_back(load(path));
+  for (const Document& document : documents) result.files.push_back(document.path);
   result.format = sensor_files.empty() ? format_of(documents[0]) : CalibrationFormat::euroc;
   switch (result.format) {
     case CalibrationFormat::kalibr:

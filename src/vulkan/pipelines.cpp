@@ -94,7 +94,7 @@ VkDescriptorSet allocate_set(const VulkanContext& context, VkDescriptorPool pool
 }
 
 Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
-                     VkPipelineCache cache)
+                     PipelineCache& cache)
     : context_(context),
       cache_(cache),
       constants_{constants, 8, sampled ? 16u : 8u},
@@ -103,7 +103,7 @@ Pipelines::Pipelines(const VulkanContext& context, const KernelConstants& consta
   make_layouts();
 }
 
-bool Pipelines::compile(const Schedule& schedule) {
+void Pipelines::compile(const Schedule& schedule) {
   std::vector<Kernel> missing;
   for (const Dispatch& dispatch : schedule.dispatches) {
     const Kernel kernel = dispatch.kernel;
@@ -132,7 +132,7 @@ bool Pipelines::compile(const Schedule& schedule) {
   for (const std::exception_ptr& error : errors) {
     if (error) std::rethrow_exception(error);
   }
-  return count > 0;
+  if (count > 0) cache_.save();
 }
 
 std::string Pipelines::variant_of(Kernel kernel) const {
@@ -198,7 +198,7 @@ Handle<VkPipeline> Pipelines::make(const std::string& name, VkPipelineLayout lay
   VkPipeline pipeline = VK_NULL_HANDLE;
   const DeviceFunctions& vk = context_.vk();
   context_.check(
-      vk.vkCreateComputePipelines(context_.device(), cache_, 1, &info, nullptr, &pipeline),
+      vk.vkCreateComputePipelines(context_.device(), cache_.get(), 1, &info, nullptr, &pipeline),
       "compile the kernel " + name);
   return context_.own(pipeline, vk.vkDestroyPipeline);
 }

@@ -7,6 +7,7 @@
 
 #include "schedule/schedule.h"
 #include "vulkan/context.h"
+#include "vulkan/pipeline_cache.h"
 
 namespace widestereo {
 
@@ -46,12 +47,12 @@ class Pipelines {
   /// buffers (shaders/bindings.glsl). Those that texture units filter have half precision where the
   /// device can write it.
   Pipelines(const VulkanContext& context, const KernelConstants& constants, bool sampled,
-            VkPipelineCache cache);
+            PipelineCache& cache);
 
-  /// Makes those that a schedule runs and that are not there yet, side by side: drivers take
-  /// seconds for all. Returns whether there were any; throws Error for iterate_raster, which is
-  /// sequential.
-  bool compile(const Schedule& schedule);
+  /// Makes those that a schedule runs and that are not there yet, side by side (drivers take
+  /// seconds for all), and saves the cache. Throws Error for iterate_raster, which is sequential,
+  /// too.
+  void compile(const Schedule& schedule);
 
   bool sampled() const { return sampled_; }
   /// Whether texture units filter.
@@ -86,7 +87,7 @@ class Pipelines {
   };
 
   const VulkanContext& context_;
-  VkPipelineCache cache_;
+  PipelineCache& cache_;
   Constants constants_;
   bool sampled_;
   bool half_precision_;

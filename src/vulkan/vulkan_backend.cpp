@@ -45,7 +45,7 @@ cv::Size largest(std::span<const cv::Size> sizes) {
 
 /// `sampled`: images are read as textures. Filters that the device lacks become exact.
 Pipelines make_pipelines(const VulkanContext& context, KernelConstants constants, bool sampled,
-                         VkPipelineCache cache) {
+                         PipelineCache& cache) {
   if (!sampled || !context.filters_intensities()) {
     constants.filter = static_cast<int>(Filter::exact);
   }
@@ -79,10 +79,8 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
       constants_(constants),
       max_samples_(tuning.max_samples > 0 ? tuning.max_samples
                                           : default_max_samples(context.properties().deviceType)),
-      cache_(cache),
-      pipelines_(make_pipelines(context, constants,
-                                tuning.sampled.value_or(!loads_texels(context.properties())),
-                                cache.get())),
+      pipelines_(make_pipelines(
+          context, constants, tuning.sampled.value_or(!loads_texels(context.properties())), cache)),
       sampler_(make_sampler(context, pipelines_.filters())),
       command_pool_(make_command_pool(context)) {
   make_images(context);
@@ -470,7 +468,7 @@ struct VulkanBackend::Run {
 
 void VulkanBackend::compile(const Schedule& schedule) {
   require_constants(schedule, constants_);
-  if (pipelines_.compile(schedule)) cache_.save();
+  pipelines_.compile(schedule);
 }
 
 void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {

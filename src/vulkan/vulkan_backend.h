@@ -106,7 +106,6 @@ class VulkanBackend final : public Backend {
   std::vector<Place> places_of_intensities_;  // which an apron surrounds
   KernelConstants constants_;
   long long max_samples_;
-  PipelineCache& cache_;
   Pipelines pipelines_;
   MapBuffer intensities_;
   MapBuffer rays_;
