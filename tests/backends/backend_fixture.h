@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include "kernel/kernel_fixture.h"
@@ -12,6 +13,12 @@
 #include "statistics/percentile.h"
 
 namespace widestereo::test {
+
+/// A back end that schedules with the constants of this one run on.
+inline std::unique_ptr<Backend> make_backend(Device::Implementation& device,
+                                             const Schedule& schedule) {
+  return device.make_backend(sizes_of(schedule.views), schedule.constants);
+}
 
 inline void upload(Backend& backend, KernelFixture& match) {
   const std::vector<View>& views = match.schedule().views;
@@ -52,7 +59,7 @@ inline void expect_costs_of_patches(Device::Implementation& device, KernelFixtur
   keep_first(schedule, Kernel::transfer_clear);
   schedule.dispatches.pop_back();
   ASSERT_EQ(schedule.dispatches.back().kernel, Kernel::iterate);
-  const auto backend = device.make_backend(sizes_of(schedule.views), schedule.constants);
+  const auto backend = make_backend(device, schedule);
   upload(*backend, match);
   backend->run(schedule, {});
   const cv::Mat_<cv::Vec4f> planes = backend->hypotheses(0).clone();

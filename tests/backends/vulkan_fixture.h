@@ -77,9 +77,7 @@ inline cv::Mat run(Backend& backend, KernelFixture& match) {
 }
 
 inline cv::Mat run(Device::Implementation& device, KernelFixture& match) {
-  const auto backend =
-      device.make_backend(sizes_of(match.schedule().views), match.schedule().constants);
-  return run(*backend, match);
+  return run(*make_backend(device, match.schedule()), match);
 }
 
 /// Parts of an application that has a device of its own.

@@ -91,7 +91,7 @@ void run_every_kernel_on(VkPhysicalDeviceType type) {
     SCOPED_TRACE(preset);
     KernelFixture match = small_match(preset);
     const Schedule& cold = match.schedule();
-    const auto backend = device->make_backend(sizes_of(cold.views), cold.constants);
+    const auto backend = make_backend(*device, cold);
     upload(*backend, match);
     Schedule warm = make_warm_schedule(match.rig(), options_of_small_match(preset));
     set_motion(warm, match.rig(), Eigen::Isometry3d::Identity(), 1);
@@ -128,7 +128,7 @@ TEST(VulkanMatch, CompilesOnceAndOnlyWhatItRuns) {
   const Schedule& cold = match.schedule();
   Schedule warm = make_warm_schedule(match.rig(), options_of_small_match("fast"));
   set_motion(warm, match.rig(), Eigen::Isometry3d::Identity(), 1);
-  const auto backend = device->make_backend(sizes_of(cold.views), cold.constants);
+  const auto backend = make_backend(*device, cold);
   upload(*backend, match);
   const int& compiled = FaultyLoader::faults().calls["vkCreateComputePipelines"];
   EXPECT_EQ(compiled, 0);
@@ -148,7 +148,7 @@ TEST(VulkanMatch, ReportsWhatFailsToCompile) {
   const auto device = open_vulkan_device(0, validated(), FaultyLoader::get_instance_proc_addr());
   KernelFixture match = small_match("paper");
   const Schedule& schedule = match.schedule();
-  const auto backend = device->make_backend(sizes_of(schedule.views), schedule.constants);
+  const auto backend = make_backend(*device, schedule);
   upload(*backend, match);
   FaultyLoader::faults().failing_function = "vkCreateComputePipelines";
   FaultyLoader::faults().failing_call = 2;
@@ -162,8 +162,7 @@ TEST(VulkanMatch, TellsItsProgressAndTimesWhenSplit) {
   REQUIRE_VULKAN_OR_SKIP();
   const auto device = open_vulkan_device(0, validated(20000));
   KernelFixture match = small_match();
-  const auto backend =
-      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
+  const auto backend = make_backend(*device, match.schedule());
   upload(*backend, match);
   std::vector<double> shares;
   backend->run(match.schedule(), [&](double share) { shares.push_back(share); });
@@ -190,8 +189,7 @@ TEST(VulkanMatch, KernelsNeedNotBeTimed) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend =
-      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
+  const auto backend = make_backend(*device, match.schedule());
   const cv::Mat timed = run(*backend, match);
   const std::vector<KernelTime> times = backend->times();
   double sum = 0;
@@ -222,8 +220,7 @@ TEST(VulkanMatch, AMatcherCanRunAgain) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend =
-      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
+  const auto backend = make_backend(*device, match.schedule());
   const cv::Mat first = run(*backend, match);
   EXPECT_TRUE(same_bits(first, run(*backend, match)));
   EXPECT_THAT(device->validation_messages(), IsEmpty());
@@ -235,8 +232,7 @@ TEST(VulkanMatch, ARunAbortedAtAnyCallbackLeavesTheMatcherUsable) {
   const FaultyLoader::Scope scope;
   const auto device =
       open_vulkan_device(0, validated(5000), FaultyLoader::get_instance_proc_addr());
-  const auto backend =
-      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
+  const auto backend = make_backend(*device, match.schedule());
   const cv::Mat expected = run(*backend, match);
   for (const int last : {1, 2, 3}) {
     int callbacks = 0;
@@ -404,8 +400,7 @@ TEST(VulkanMatch, RefusesWhatDoesNotFit) {
   REQUIRE_VULKAN_OR_SKIP();
   KernelFixture match = small_match();
   const auto device = open_vulkan_device(0, validated());
-  const auto backend =
-      device->make_backend(sizes_of(match.schedule().views), match.schedule().constants);
+  const auto backend = make_backend(*device, match.schedule());
   EXPECT_THAT(error_of([&] { backend->set_rays(1, match.view(0).rays); }), HasSubstr("38x38"));
   EXPECT_THAT(error_of([&] { backend->set_intensity(0, match.view(0).rays); }),
               HasSubstr("CV_32FC1"));
