@@ -8,7 +8,8 @@ FN float intensity_between(float before, float a, float b, float after) {
   // The spline of Catmull and Rom; beyond a masked neighbour the line through a and b goes on.
   float rise = before >= 0.0f ? a - before : b - a;
   float fall = after >= 0.0f ? b - after : a - b;
-  return clamp(0.5f * (a + b) + 0.0625f * (rise + fall), 0.0f, 1.0f);
+  // Of images of little contrast, which are stretched, bright pixels lie beyond 1.
+  return clamp(0.5f * (a + b) + 0.0625f * (rise + fall), 0.0f, max(1.0f, max(a, b)));
 }
 
 // Halfway between a pixel and its right neighbour.

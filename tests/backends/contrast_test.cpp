@@ -9,6 +9,7 @@
 
 #include "match_fixture.h"
 #include "same_bits.h"
+#include "widestereo/evaluation.h"
 #include "widestereo/image_io.h"
 #include "widestereo/matcher.h"
 
@@ -59,6 +60,29 @@ TEST(Contrast, ThatIsUsualIsLeftAsItIs) {
   const RenderedPair pair = render_demo(size);
   for (const ViewResult& view : match(pair.rig, images_of(pair), 20).views) {
     EXPECT_EQ(view.gain, 1);
+  }
+}
+
+/// Pixels that are white after that take part like all others.
+TEST(Contrast, OfHazyImagesIsStretchedAsThatOfDarkOnes) {
+  const RenderedPair pair = render_demo(96);
+  const auto wrong_by_a_pixel = [&](double black) {
+    std::vector<cv::Mat> images;
+    for (const cv::Mat& image : images_of(pair)) {
+      images.emplace_back();
+      to_grey_levels(image, "demo").convertTo(images.back(), CV_8UC1, 0.15, black);
+    }
+    const ViewResult view = match(pair.rig, images, 20).views[0];
+    EXPECT_GT(view.gain, 3);
+    const std::vector<RegionScores> scores =
+        evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
+    EXPECT_EQ(scores[1].region, "non-occluded");
+    return scores[1].bad_pixels.at(1.0);
+  };
+  const double of_dark = wrong_by_a_pixel(5);
+  EXPECT_LT(of_dark, 0.3);
+  for (const double black : {70, 140, 200}) {
+    EXPECT_LT(wrong_by_a_pixel(black), of_dark + 0.05) << black;
   }
 }
 
