@@ -96,7 +96,9 @@ void run_depth(const DepthArguments& arguments) {
   const ws::Options options = settings.options();
   arguments.format.require_room_for(options.min_distance, options.max_distance);
 
-  const std::vector<double> blurs = arguments.sharpness.blurs(rig, images);
+  const std::vector<ws::PixelMatch> features = features_of_pair(images);
+  const std::vector<double> blurs = arguments.sharpness.blurs(rig, images, features);
+  report_features_out_of_range(rig, features, options, calibrated.in_metres ? " m" : "");
   const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);
   FolderContents contents{
       .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres, .blurs = blurs};

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "matching_run.h"
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 
 #include "progress_bar.h"
 #include "result_folders.h"
 #include "say.h"
+#include "text/formatted.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 #include "widestereo/image_io.h"
@@ -97,6 +99,38 @@ void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images)
     if (masked || !is_blank(images[i], view.mask)) continue;
     say("The image of " + view.name + " is blank but for noise; check its camera and lens.");
   }
+}
+
+std::vector<ws::PixelMatch> features_of_pair(const std::vector<cv::Mat>& images) {
+  if (images.size() != 2) return {};
+  return ws::match_features(images[0], images[1]);
+}
+
+void report_features_out_of_range(const ws::Rig& rig, const std::vector<ws::PixelMatch>& matches,
+                                  const ws::Options& options, const std::string& unit) {
+  if (matches.empty()) return;
+  const ws::RangeReport range = ws::check_range(rig.views[0], rig.views[1], matches,
+                                                options.min_distance, options.max_distance);
+  // False matches are fewer: at most 0.5 % of any pair at hand whose range fits.
+  constexpr double many = 0.01;
+  constexpr int fewest = 5;
+  const auto report_if_many = [&](int outside, const char* where, const std::string& most,
+                                  const char* remedy) {
+    const double share = static_cast<double>(outside) / std::max(range.matches, 1);
+    if (outside < fewest || share < many) return;
+    say(ws::formatted("%.0f %% of the features that match lie ", 100 * share) + where + unit +
+        most + ", and nothing there can be found; give a " + remedy + " one.");
+  };
+  const auto most = [&](const char* words, double distance) {
+    return ws::formatted(" (99 %% of all %s %.3g", words, distance) + unit + ")";
+  };
+  report_if_many(
+      range.nearer, ws::formatted("nearer than --min-distance %g", options.min_distance).c_str(),
+      range.nearest < options.min_distance ? most("beyond", range.nearest) : "", "smaller");
+  report_if_many(
+      range.farther, ws::formatted("farther than --max-distance %g", options.max_distance).c_str(),
+      // Those of hardly any parallax have no distance.
+      range.farthest > options.max_distance ? most("within", range.farthest) : "", "larger");
 }
 
 void report_views_without_overlap(const ws::Rig& rig, const ws::StereoResult& result) {

@@ -10,6 +10,7 @@
 
 #include "folder_lock.h"
 #include "match_settings.h"
+#include "widestereo/epipolar.h"
 #include "widestereo/matcher.h"
 #include "widestereo/sfm_model.h"
 
@@ -45,6 +46,14 @@ void require_different_pictures(const widestereo::Rig& rig, const std::vector<cv
 /// Says, on standard error, which images are blank: black ones, of a covered lens or a camera that
 /// failed.
 void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
+
+/// The features of a pair's images that match; none of more or fewer views.
+std::vector<widestereo::PixelMatch> features_of_pair(const std::vector<cv::Mat>& images);
+/// Says, on standard error, where many of a pair's features lie outside the range of distances,
+/// which the pixels there cannot tell: they match something else. `unit`: of lengths.
+void report_features_out_of_range(const widestereo::Rig& rig,
+                                  const std::vector<widestereo::PixelMatch>& matches,
+                                  const widestereo::Options& options, const std::string& unit);
 
 /// Says, on standard error, which views see nothing that another one does.
 void report_views_without_overlap(const widestereo::Rig& rig,

@@ -3,7 +3,6 @@
 
 #include "say.h"
 #include "text/formatted.h"
-#include "widestereo/epipolar.h"
 #include "widestereo/error.h"
 #include "widestereo/sharpness.h"
 
@@ -30,8 +29,8 @@ void SharpnessSettings::add_to(CLI::App& command) {
       ->check(CLI::Range(0.0, 10.0));
 }
 
-std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig,
-                                             const std::vector<cv::Mat>& images) const {
+std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig, const std::vector<cv::Mat>& images,
+                                             const std::vector<ws::PixelMatch>& matches) const {
   const std::size_t count = rig.views.size();
   if (given_.size() > 1 && given_.size() != count) {
     throw ws::Error("--blur was given " + std::to_string(given_.size()) + " values for " +
@@ -48,8 +47,8 @@ std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig,
       return blurs;
     }
   }
-  const auto difference = ws::compare_sharpness(rig.views[0], rig.views[1], images[0], images[1],
-                                                ws::match_features(images[0], images[1]));
+  const auto difference =
+      ws::compare_sharpness(rig.views[0], rig.views[1], images[0], images[1], matches);
   if (!difference) return blurs;
   const auto sharper = static_cast<std::size_t>(difference->sharper);
   blurs[sharper] = difference->blur;

@@ -40,4 +40,20 @@ std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& seco
 EpipolarReport check_epipolar(const View& first, const View& second,
                               const std::vector<PixelMatch>& matches);
 
+/// Whether matched features lie within a range of distances from the first camera.
+struct RangeReport {
+  int matches = 0;  ///< within a pixel of their epipolar curves
+  int nearer = 0;   ///< of these, by more than 2 pixels in the second image
+  int farther = 0;  ///< likewise; points behind the cameras, where rays diverge, are not
+  /// Percentiles 1 and 99 of the distances (metres) of matches with at least 0.3 degrees of
+  /// parallax, points behind the cameras left out; zeros without any.
+  double nearest = 0, farthest = 0;
+};
+
+/// Matches on masked pixels and at the epipole are left out. Throws Error when the views share a
+/// centre, or for distances that are not 0 < min_distance < max_distance.
+RangeReport check_range(const View& first, const View& second,
+                        const std::vector<PixelMatch>& matches, double min_distance,
+                        double max_distance);
+
 }  // namespace widestereo

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
+#include <string>
 
 #include "calibration/match_rays.h"
 #include "geometry/angle.h"
@@ -19,7 +21,8 @@ namespace {
 
 constexpr double ratio = 0.8;
 constexpr std::size_t fewest_matches = 8;
-constexpr double at_epipole = 1e-6;  // radians
+constexpr double at_epipole = 1e-6;     // radians
+constexpr double least_parallax = 0.3;  // degrees, to tell a distance
 /// SIFT looks for features in an image of twice the size, and takes pixel 2 x of it for pixel x,
 /// whose middle lies a quarter of a pixel farther.
 constexpr float sift_offset = 0.25f;
@@ -67,6 +70,65 @@ double triangulated_distance(const Eigen::Vector3d& ray, const Eigen::Vector3d& 
   return centre.cross(other).dot(normal) / normal.squaredNorm();
 }
 
+/// What a pair of views says of a match.
+struct TriangulatedMatch {
+  double pixels = 0;               ///< in the second image, to the epipolar curve
+  double degrees = 0;              ///< of the second ray to the epipolar plane
+  double parallax = 0;             ///< degrees
+  std::optional<double> distance;  ///< from the first camera; of enough parallax to tell
+  Eigen::Vector3d first_ray;
+};
+
+class EpipolarGeometry {
+ public:
+  /// `what`: begins the message where both views share a centre.
+  EpipolarGeometry(const View& first, const View& second, const std::string& what)
+      : rays_(first, second), motion_(source_from_reference(second, first)) {
+    require_baseline(first, second, what);
+  }
+
+  /// Nothing where it is masked, or lies where a camera has no ray, or at the epipole.
+  std::optional<TriangulatedMatch> find(const PixelMatch& match) const {
+    Eigen::Vector3d ray_first;
+    Eigen::Vector3d ray_second;
+    if (!rays_.find(match, ray_first, ray_second)) return std::nullopt;
+    const Eigen::Vector3d epipole = motion_.translation();
+    const Eigen::Vector3d rotated = motion_.linear() * ray_first;
+    const Eigen::Vector3d normal = epipole.cross(rotated);
+    // A ray to the epipole lies in every epipolar plane.
+    if (!(normal.norm() > at_epipole * epipole.norm())) return std::nullopt;
+    const Eigen::Vector3d plane = normal.normalized();
+    const double offset = plane.dot(ray_second);
+    Eigen::Vector2d foot;
+    if (!rays_.second_camera().project(ray_second - offset * plane, foot)) return std::nullopt;
+    TriangulatedMatch found{
+        .pixels = (foot - match.second).norm(),
+        .degrees = std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees_per_radian,
+        .parallax = degrees_between(rotated, ray_second),
+        .distance = std::nullopt,
+        .first_ray = ray_first};
+    if (found.parallax >= least_parallax) {
+      const Eigen::Vector3d other = motion_.linear().transpose() * ray_second;
+      found.distance = triangulated_distance(ray_first, other, motion_.inverse().translation());
+    }
+    return found;
+  }
+
+  /// Of the points of a ray at a distance.
+  double parallax(const Eigen::Vector3d& first_ray, double distance) const {
+    return degrees_between(motion_.linear() * first_ray, motion_ * (distance * first_ray));
+  }
+
+  /// Where the second image has the point of a ray of the first camera; false where it does not.
+  bool project(const Eigen::Vector3d& first_ray, double distance, Eigen::Vector2d& pixel) const {
+    return rays_.second_camera().project(motion_ * (distance * first_ray), pixel);
+  }
+
+ private:
+  MatchRays rays_;
+  Eigen::Isometry3d motion_;  // from the first camera to the second
+};
+
 }  // namespace
 
 std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& second) {
@@ -88,35 +150,19 @@ std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& seco
 
 EpipolarReport check_epipolar(const View& first, const View& second,
                               const std::vector<PixelMatch>& matches) {
-  require_baseline(first, second, "The epipolar check");
-  const Eigen::Isometry3d motion = source_from_reference(second, first);
-  const Eigen::Vector3d epipole = motion.translation();
-  const MatchRays rays(first, second);
+  const EpipolarGeometry geometry(first, second, "The epipolar check");
   std::vector<double> pixels;
   std::vector<double> angles;
   std::vector<double> distances;
   int behind = 0;
   for (const PixelMatch& match : matches) {
-    Eigen::Vector3d ray_first;
-    Eigen::Vector3d ray_second;
-    if (!rays.find(match, ray_first, ray_second)) continue;
-    const Eigen::Vector3d rotated = motion.linear() * ray_first;
-    const Eigen::Vector3d normal = epipole.cross(rotated);
-    // A ray to the epipole lies in every epipolar plane.
-    if (!(normal.norm() > at_epipole * epipole.norm())) continue;
-    const Eigen::Vector3d plane = normal.normalized();
-    const double offset = plane.dot(ray_second);
-    Eigen::Vector2d foot;
-    if (!rays.second_camera().project(ray_second - offset * plane, foot)) continue;
-    pixels.push_back((foot - match.second).norm());
-    angles.push_back(std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees_per_radian);
-    const double parallax = degrees_between(rotated, ray_second);
-    if (parallax < 0.3) continue;
-    const Eigen::Vector3d other = motion.linear().transpose() * ray_second;
-    const Eigen::Vector3d centre = motion.inverse().translation();
-    const double distance = triangulated_distance(ray_first, other, centre);
-    if (distance < 0) ++behind;
-    if (distance > 0 && pixels.back() < 5) distances.push_back(distance);
+    const auto found = geometry.find(match);
+    if (!found) continue;
+    pixels.push_back(found->pixels);
+    angles.push_back(found->degrees);
+    if (!found->distance) continue;
+    if (*found->distance < 0) ++behind;
+    if (*found->distance > 0 && found->pixels < 5) distances.push_back(*found->distance);
   }
   if (pixels.size() < fewest_matches) {
     throw Error("Only " + std::to_string(pixels.size()) + " features match between " + first.name +
@@ -138,6 +184,41 @@ EpipolarReport check_epipolar(const View& first, const View& second,
   report.nearest = percentile(distances, 0.05);
   report.typical = percentile(distances, 0.5);
   report.farthest = percentile(distances, 0.95);
+  return report;
+}
+
+RangeReport check_range(const View& first, const View& second,
+                        const std::vector<PixelMatch>& matches, double min_distance,
+                        double max_distance) {
+  if (!(min_distance > 0 && min_distance < max_distance)) {
+    throw Error("A range of distances from " + std::to_string(min_distance) + " to " +
+                std::to_string(max_distance) + " holds none; give 0 < min < max.");
+  }
+  constexpr double on_curve = 1;      // pixels
+  constexpr double out_of_range = 2;   // pixels
+  const EpipolarGeometry geometry(first, second, "The check of the range");
+  RangeReport report;
+  std::vector<double> distances;
+  for (const PixelMatch& match : matches) {
+    const auto found = geometry.find(match);
+    if (!found || found->pixels > on_curve) continue;
+    const bool is_behind = found->distance && *found->distance < 0;
+    ++report.matches;
+    if (is_behind) continue;
+    if (found->distance) distances.push_back(*found->distance);
+    const auto displaced_from = [&](double distance) {
+      Eigen::Vector2d pixel;
+      return geometry.project(found->first_ray, distance, pixel) &&
+             (pixel - match.second).norm() > out_of_range;
+    };
+    if (found->parallax < geometry.parallax(found->first_ray, max_distance)) {
+      report.farther += displaced_from(max_distance);
+    } else if (found->parallax > geometry.parallax(found->first_ray, min_distance)) {
+      report.nearer += displaced_from(min_distance);
+    }
+  }
+  report.nearest = percentile(distances, 0.01);
+  report.farthest = percentile(distances, 0.99);
   return report;
 }
 

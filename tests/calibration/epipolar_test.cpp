@@ -8,6 +8,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <utility>
 
 #include "data_folder.h"
 #include "error_of.h"
@@ -243,6 +244,76 @@ TEST(Epipolar, LeavesOutMatchesAtTheEpipole) {
   epipole.second = epipole.first - Eigen::Vector2d(0, 30);
   matches.push_back(epipole);
   EXPECT_EQ(check_epipolar(rig.views[0], rig.views[1], matches).matches, 400);
+}
+
+/// Matches of points up to 45 degrees off the first camera's axis at a distance from it.
+std::vector<PixelMatch> matches_at(const Rig& rig, double distance, std::size_t count) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::vector<PixelMatch> matches;
+  while (matches.size() < count) {
+    const Eigen::Vector3d point =
+        distance * Eigen::Vector3d(unit(random), unit(random), 1.5).normalized();
+    PixelMatch match;
+    if (project(rig.views[0].camera, point, match.first) &&
+        project(rig.views[1].camera, rig.views[1].world_from_camera.inverse() * point,
+                match.second)) {
+      matches.push_back(match);
+    }
+  }
+  return matches;
+}
+
+TEST(Range, OfDistancesIsCheckedByFeatures) {
+  for (const double turned : {0, 25}) {
+    const Rig rig = rig_with_rotation_error(turned);
+    std::vector<PixelMatch> matches;
+    const auto add = [&](double distance, std::size_t count) {
+      const std::vector<PixelMatch> more = matches_at(rig, distance, count);
+      matches.insert(matches.end(), more.begin(), more.end());
+    };
+    add(0.6, 40);
+    add(2, 300);
+    add(4.1, 80);  // less than a pixel beyond 4
+    add(50, 60);
+    add(1e6, 20);
+    const auto report = [&](double min, double max) {
+      return check_range(rig.views[0], rig.views[1], matches, min, max);
+    };
+    const RangeReport all = report(0.5, 100);
+    EXPECT_EQ(all.matches, 500);
+    EXPECT_EQ(all.nearer, 0);
+    EXPECT_EQ(all.farther, 0) << "what lies at infinity is hardly displaced";
+    EXPECT_NEAR(all.nearest, 0.6, 1e-6);
+    EXPECT_NEAR(all.farthest, 4.1, 1e-6) << "farther ones have too little parallax";
+    const RangeReport part = report(1, 4);
+    EXPECT_EQ(part.matches, 500);
+    EXPECT_EQ(part.nearer, 40);
+    EXPECT_EQ(part.farther, 80);
+    EXPECT_EQ(report(5, 100).nearer, 40 + 300);
+    EXPECT_EQ(report(0.1, 0.3).farther, 500);
+    EXPECT_EQ(report(0.1, 0.3).nearer, 0);
+  }
+}
+
+TEST(Range, IsNotToldByWhatDoesNotFitTheCalibration) {
+  const Rig rig = rig_with_rotation_error(0);
+  std::vector<PixelMatch> matches = matches_at(rig, 2, 100);
+  for (std::size_t i = 0; i < 30; ++i) {
+    // Rays that diverge; and a match of something else, off its epipolar curve.
+    if (i % 2 == 0) std::swap(matches[i].first, matches[i].second);
+    if (i % 2 == 1) matches[i].second += Eigen::Vector2d(-40, 20);
+  }
+  const RangeReport report = check_range(rig.views[0], rig.views[1], matches, 1, 4);
+  EXPECT_EQ(report.matches, 85);
+  EXPECT_EQ(report.nearer, 0);
+  EXPECT_EQ(report.farther, 0);
+  EXPECT_NEAR(report.nearest, 2, 1e-6);
+  EXPECT_NEAR(report.farthest, 2, 1e-6);
+  EXPECT_EQ(check_range(rig.views[0], rig.views[1], {}, 1, 4).matches, 0);
+  for (const auto& [min, max] : {std::pair(0.0, 4.0), {4.0, 4.0}, {1.0, std::nan("")}}) {
+    EXPECT_THROW(check_range(rig.views[0], rig.views[1], matches, min, max), Error);
+  }
 }
 
 TEST(Epipolar, RealPairsAreAsGoodAsTheirCalibration) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The command as a user meets it: results, messages, exit codes, and nothing half-written.
+#include <gmock/gmock.h>
+
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -14,6 +16,10 @@
 
 namespace widestereo::test {
 namespace {
+
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST_F(Command, DemoScoresItself) {
   const Outcome outcome =
@@ -1034,6 +1040,34 @@ TEST_F(ShiftedPair, SequencesOfSwappedCamerasGiveAHint) {
   };
   EXPECT_TRUE(has_hint("cam1,cam0"));
   EXPECT_FALSE(has_hint("cam0,cam1"));
+}
+
+TEST_F(ShiftedPair, FeaturesOutOfTheRangeAreReported) {
+  for (const char* camera : {"cam0", "cam1"}) fs::create_directories(folder_ / camera);
+  fs::copy(folder_ / "left.png", folder_ / "cam0" / "1.png");
+  fs::copy(folder_ / "right.png", folder_ / "cam1" / "1.png");
+  const std::string pair = "depth " + file("left.png") + " " + file("right.png");
+  const std::string sequence = "sequence " + folder_.path().string();
+  int number = 0;
+  const auto outcome = [&](const std::string& command, const char* range) {
+    const Outcome run_of =
+        run(command + " -c " + file("calib.yaml") + " -o " + file(std::to_string(number++)) +
+            " --preset fast --device cpu " + range);
+    EXPECT_EQ(run_of.exit_code, 0) << run_of.output;
+    return run_of.output;
+  };
+  for (const std::string& command : {pair, sequence}) {
+    EXPECT_THAT(outcome(command, "--min-distance 0.1 --max-distance 50"),
+                Not(HasSubstr("features that match lie")));
+    EXPECT_THAT(outcome(command, "--min-distance 0.1 --max-distance 0.2"),
+                ContainsRegex("% of the features that match lie farther than --max-distance 0.2 m "
+                              ".99 % of all within 0.[0-9]+ m., and nothing there can be found; "
+                              "give a larger one"));
+    EXPECT_THAT(outcome(command, "--min-distance 2"),
+                ContainsRegex("% of the features that match lie nearer than --min-distance 2 m "
+                              ".99 % of all beyond 0.[0-9]+ m., and nothing there can be found; "
+                              "give a smaller one"));
+  }
 }
 
 /// As of one camera on both channels.
