@@ -44,8 +44,9 @@ class SfmModel {
   /// that they will do as names within a folder of results.
   const std::vector<std::string>& names() const;
 
-  /// Forgets images, as such whose files are missing: the others are numbered anew. Throws Error
-  /// for numbers of no image, and where none would be left.
+  /// Forgets images, as such whose files are missing: the others are numbered anew. The points are
+  /// read again. Throws Error, and forgets none, for numbers of no image, where none would be left,
+  /// and where the points cannot be read.
   void leave_out(const std::vector<std::size_t>& images);
 
   /// Where an image lies, by its path in the model, which begins in `folder`. Throws Error for

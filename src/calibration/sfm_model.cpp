@@ -123,12 +123,12 @@ class SfmModel::Implementation {
                   " has no image; give a model in which images are registered.");
     }
     name_images();
-    read_points();
+    points_ = points_of(images_);
   }
 
-  bool has_points() const { return !positions_.empty(); }
+  bool has_points() const { return !points_.positions.empty(); }
 
-  const ViewSelection& selection() const { return selection_; }
+  const ViewSelection& selection() const { return points_.selection; }
 
   const std::vector<std::string>& names() const { return names_; }
 
@@ -140,14 +140,17 @@ class SfmModel::Implementation {
     }
     const auto left = std::ranges::count(is_left, true);
     if (left == 0) throw Error("No image of " + path_.string() + " would be left; keep one.");
-    std::vector<ColmapImage> all = std::exchange(images_, {});
-    std::vector<std::string> names = std::exchange(names_, {});
-    for (std::size_t i = 0; i < all.size(); ++i) {
+    std::vector<ColmapImage> kept;
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < images_.size(); ++i) {
       if (!is_left[i]) continue;
-      images_.push_back(std::move(all[i]));
-      names_.push_back(std::move(names[i]));
+      kept.push_back(images_[i]);
+      names.push_back(names_[i]);
     }
-    read_points();
+    // What may throw comes before any change.
+    points_ = points_of(kept);
+    images_ = std::move(kept);
+    names_ = std::move(names);
   }
 
   fs::path file_of(std::size_t number, const fs::path& folder) const {
@@ -197,8 +200,8 @@ class SfmModel::Implementation {
     for (const std::size_t number : images) {
       const ColmapImage& image = image_at(number);
       for (const std::uint64_t observed : image.points) {
-        const auto point = positions_.find(observed);
-        if (point == positions_.end()) continue;
+        const auto point = points_.positions.find(observed);
+        if (point == points_.positions.end()) continue;
         const double distance = (image.camera_from_world * point->second).norm();
         if (std::isfinite(distance)) values.push_back(distance);
       }
@@ -209,6 +212,11 @@ class SfmModel::Implementation {
   }
 
  private:
+  struct Points {
+    std::unordered_map<std::uint64_t, Eigen::Vector3d> positions;
+    ViewSelection selection{{}, {}};
+  };
+
   const ColmapImage& image_at(std::size_t number) const {
     require_number(number, images_.size(), "image", path_.string());
     return images_[number];
@@ -234,37 +242,38 @@ class SfmModel::Implementation {
     }
   }
 
-  void read_points() {
+  /// Those that the images observe.
+  Points points_of(const std::vector<ColmapImage>& images) const {
     std::vector<Eigen::Vector3d> centres;
-    for (const ColmapImage& image : images_) {
+    for (const ColmapImage& image : images) {
       centres.push_back(image.camera_from_world.inverse().translation());
     }
     std::vector<ObservedPoint> points;
-    positions_.clear();
+    Points all;
     const fs::path file = colmap_file(path_, "points3D");
     if (!file.empty()) {
       std::unordered_map<std::uint64_t, std::vector<std::size_t>> observers;
-      for (std::size_t i = 0; i < images_.size(); ++i) {
-        for (const std::uint64_t number : images_[i].points) observers[number].push_back(i);
+      for (std::size_t i = 0; i < images.size(); ++i) {
+        for (const std::uint64_t number : images[i].points) observers[number].push_back(i);
       }
       calibration::each_colmap_point(file,
                                      [&](std::uint64_t number, const Eigen::Vector3d& position) {
                                        const auto observed = observers.find(number);
                                        if (observed == observers.end()) return;
                                        if (!position.allFinite()) return;
-                                       positions_.emplace(number, position);
+                                       all.positions.emplace(number, position);
                                        points.push_back({position, std::move(observed->second)});
                                      });
     }
-    selection_ = ViewSelection(std::move(centres), std::move(points));
+    all.selection = ViewSelection(std::move(centres), std::move(points));
+    return all;
   }
 
   fs::path path_, cameras_file_, images_file_;
   std::map<std::uint64_t, ColmapCamera> cameras_;
   std::vector<ColmapImage> images_;  // in the order of names_, by their paths
   std::vector<std::string> names_;
-  std::unordered_map<std::uint64_t, Eigen::Vector3d> positions_;  // of points
-  ViewSelection selection_{{}, {}};
+  Points points_;
 };
 
 SfmModel::SfmModel(const fs::path& path)

@@ -346,6 +346,13 @@ std::optional<Eigen::Isometry3d> estimate_motion(const Rig& rig,
                                                  const std::vector<cv::Mat>& images) {
   require_sizes(rig, previous_images, previous, images);
   const std::size_t count = rig.views.size();
+  if (count == 0) return std::nullopt;
+  // Turns about a place far away are hardly told from shifts.
+  const Eigen::Translation3d origin(rig.views.front().world_from_camera.translation());
+  Rig about_origin = rig;
+  for (View& view : about_origin.views) {
+    view.world_from_camera = origin.inverse() * view.world_from_camera;
+  }
   std::vector<std::vector<Point>> points(count);
   std::vector<cv::Mat> usable(count);
   std::vector<std::array<cv::Mat, 2>> intensities(count);
@@ -360,9 +367,9 @@ std::optional<Eigen::Isometry3d> estimate_motion(const Rig& rig,
     std::transform(
         reasons.begin<std::uint16_t>(), reasons.end<std::uint16_t>(), usable[i].begin<uchar>(),
         [](std::uint16_t all) { return (all & reason_no_ray) == 0 ? uchar{255} : uchar{0}; });
-    points[i] = accepted_points(rig.views[i], previous[i]);
+    points[i] = accepted_points(about_origin.views[i], previous[i]);
   });
-  Alignment alignment(rig, std::move(points));
+  Alignment alignment(about_origin, std::move(points));
   std::vector<ScaledView> views(count);
   for (const int scale : scales) {
     for_each_view(count, [&](std::size_t i) {
@@ -371,7 +378,7 @@ std::optional<Eigen::Isometry3d> estimate_motion(const Rig& rig,
     alignment.refine(views);
   }
   if (!alignment.is_determined(views)) return std::nullopt;
-  return alignment.motion();
+  return origin * alignment.motion() * origin.inverse();
 }
 
 }  // namespace widestereo

@@ -312,6 +312,23 @@ TEST(Motion, IsTheSameInEveryUnitOfLength) {
   }
 }
 
+TEST(Motion, IsTheSameWhereverTheRigsFrameBegins) {
+  const std::vector<cv::Mat> images = images_of(frame(1));
+  const auto estimate = [&](const Rig& rig) {
+    return estimate_motion(rig, images_of(frame(0)), true_planes(frame(0)), images);
+  };
+  const auto found = estimate(frame(0).rig);
+  ASSERT_TRUE(found.has_value());
+  const Eigen::Translation3d away(2e4, 1e4, -300);
+  Rig rig = frame(0).rig;
+  for (View& view : rig.views) view.world_from_camera = away * view.world_from_camera;
+  const auto motion = estimate(rig);
+  ASSERT_TRUE(motion.has_value());
+  const Eigen::Isometry3d brought_back = away.inverse() * *motion * away;
+  EXPECT_LT((brought_back.linear() - found->linear()).norm(), 1e-6);
+  EXPECT_LT((brought_back.translation() - found->translation()).norm(), 1e-6);
+}
+
 TEST(Motion, NeedsARigThatIsValid) {
   Rig rig = frame(0).rig;
   rig.views[1].camera.fx = -1;

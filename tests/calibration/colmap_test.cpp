@@ -350,6 +350,11 @@ TEST_F(Colmap, WhatIsLeftOutIsForgotten) {
   EXPECT_EQ(model.calibrated({0}).rig.views[0].camera.model, CameraModel::kannala_brandt);
   EXPECT_TRUE(model.has_points());
   EXPECT_THROW(model.leave_out({2}), Error);
+  folder_.write("points3D.bin", points.substr(0, points.size() - 1));
+  EXPECT_THROW(model.leave_out({0}), Error);
+  EXPECT_EQ(model.names(), (std::vector<std::string>{"left/a b.png", "left/b.png"}));
+  EXPECT_TRUE(model.has_points()) << "as before";
+  folder_.write("points3D.bin", points);
   model.leave_out({0});
   EXPECT_EQ(model.names(), std::vector<std::string>{"left/b.png"});
   EXPECT_FALSE(model.has_points()) << "which none of those left observes";
