@@ -38,10 +38,10 @@ using MapsOfView = std::function<ViewMaps(std::size_t view)>;
 /// half of the cache, ten at least) that its point projects to and that agree. Where one of them is
 /// part of a point already, seen about as finely, that point stands for the new pixel, too, and for
 /// what later agrees with it. Else the point is their mean, weighted by the inverse square of the
-/// distance that each was seen from; its confidence that of the surest. A point that more views see
-/// through, to a farther surface, than have it is left out, unless min_views is 1. The same input
-/// gives the same cloud. `progress` is told the share done. Throws Error when maps do not fit their
-/// view, for views that are not valid and limits below 0 or NaN, and what `maps` throws.
+/// spacing of each one's pixels there; its confidence that of the surest. A point that more views
+/// see through, to a farther surface, than have it is left out, unless min_views is 1. The same
+/// input gives the same cloud. `progress` is told the share done. Throws Error when maps do not fit
+/// their view, for views that are not valid and limits below 0 or NaN, and what `maps` throws.
 PointCloud fuse(const std::vector<View>& views, const std::vector<std::vector<std::size_t>>& others,
                 const MapsOfView& maps, const FusionOptions& options = {},
                 const std::function<void(double)>& progress = {});

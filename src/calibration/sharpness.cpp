@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibration/match_rays.h"
+#include "geometry/pixel_angle.h"
 #include "geometry/validation.h"
 #include "statistics/percentile.h"
 #include "statistics/robust.h"
@@ -48,21 +49,6 @@ cv::Mat edge_energy(const cv::Mat& intensity, double scale) {
 cv::Point pixel_of(const Eigen::Vector2d& point, const cv::Mat& image) {
   return {std::clamp(cvRound(point.x()), 0, image.cols - 1),
           std::clamp(cvRound(point.y()), 0, image.rows - 1)};
-}
-
-/// Side, radians, of the square that a pixel's rays fill; none where there are none.
-std::optional<double> pixel_angle(const PreparedCamera& camera, const Eigen::Vector2d& pixel) {
-  Eigen::Vector3d left;
-  Eigen::Vector3d right;
-  Eigen::Vector3d above;
-  Eigen::Vector3d below;
-  if (!camera.unproject(pixel - Eigen::Vector2d(0.5, 0), left) ||
-      !camera.unproject(pixel + Eigen::Vector2d(0.5, 0), right) ||
-      !camera.unproject(pixel - Eigen::Vector2d(0, 0.5), above) ||
-      !camera.unproject(pixel + Eigen::Vector2d(0, 0.5), below)) {
-    return std::nullopt;
-  }
-  return std::sqrt((right - left).cross(below - above).norm());
 }
 
 /// Whether a feature is about as large in both images: detail of another size would pass for blur.
@@ -170,23 +156,19 @@ double blur_of_finer_pixels(const View& view, const View& other) {
   const MatchRays rays(view, other);
   const Eigen::Matrix3d rotation = source_from_reference(other, view).linear();
   std::vector<double> scales;  // pixels of the view for one of the other's
-  for (int y = 0; y < directions; ++y) {
-    for (int x = 0; x < directions; ++x) {
-      PixelMatch match;
-      match.first = {(x + 0.5) / directions * view.camera.width - 0.5,
-                     (y + 0.5) / directions * view.camera.height - 0.5};
-      Eigen::Vector3d ray;
-      Eigen::Vector3d ray_of_other;
-      if (!rays.first_camera().unproject(match.first, ray) ||
-          !rays.second_camera().project_into_image(rotation * ray, match.second) ||
-          !rays.find(match, ray, ray_of_other)) {
-        continue;
-      }
-      const auto angle = pixel_angle(rays.first_camera(), match.first);
-      const auto other_angle = pixel_angle(rays.second_camera(), match.second);
-      if (angle && other_angle) scales.push_back(*other_angle / *angle);
+  for_each_of_grid(view.camera, directions, [&](const Eigen::Vector2d& pixel) {
+    PixelMatch match{.first = pixel, .second = {}};
+    Eigen::Vector3d ray;
+    Eigen::Vector3d ray_of_other;
+    if (!rays.first_camera().unproject(match.first, ray) ||
+        !rays.second_camera().project_into_image(rotation * ray, match.second) ||
+        !rays.find(match, ray, ray_of_other)) {
+      return;
     }
-  }
+    const auto angle = pixel_angle(rays.first_camera(), match.first);
+    const auto other_angle = pixel_angle(rays.second_camera(), match.second);
+    if (angle && other_angle) scales.push_back(*other_angle / *angle);
+  });
   if (scales.empty()) return 0;
   const double scale = percentile(scales, 0.5);
   return scale < largest_scale ? 0 : blur_of_a_pixel * std::sqrt(scale * scale - 1);

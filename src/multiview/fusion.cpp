@@ -12,6 +12,7 @@
 
 #include "geometry/angle.h"
 #include "geometry/distance.h"
+#include "geometry/pixel_angle.h"
 #include "geometry/validation.h"
 #include "io/point_cloud.h"
 #include "text/number.h"
@@ -96,8 +97,9 @@ class CloudCache {
 /// The mean of what views see of one point.
 class Mean {
  public:
-  void add(const CloudPoint& point, double distance) {
-    const double weight = 1 / (distance * distance);
+  /// `spacing`: of the pixels of the view that sees it, there.
+  void add(const CloudPoint& point, double spacing) {
+    const double weight = 1 / (spacing * spacing);
     weights_ += weight;
     position_ += weight * point.position.cast<double>();
     normal_ += weight * point.normal.cast<double>();
@@ -127,17 +129,17 @@ class Mean {
   int count_ = 0;
 };
 
-// A point stands for pixels that see it from less far than this times as far as its own, too.
+// A point stands for pixels that are up to this times as fine as its own, too.
 constexpr double as_fine = 1.2;
 
-/// How finely a point is seen: the distance it is seen from in sixteenths of an octave, modulo 255,
-/// so that it fits a byte; 0 where a pixel is part of no point.
+/// How finely a point is seen: the spacing of the pixels that see it in sixteenths of an octave,
+/// modulo 255, so that it fits a byte; 0 where a pixel is part of no point.
 using Fineness = std::uint8_t;
 constexpr double steps_per_octave = 16;
 constexpr long fineness_values = 255;
 
-Fineness fineness_from(double distance) {
-  const long step = std::lround(steps_per_octave * std::log2(distance)) % fineness_values;
+Fineness fineness_of(double spacing) {
+  const long step = std::lround(steps_per_octave * std::log2(spacing)) % fineness_values;
   return static_cast<Fineness>(1 + (step + fineness_values) % fineness_values);
 }
 
@@ -147,9 +149,9 @@ long steps_coarser(Fineness a, Fineness b) {
   return (a - b + fineness_values + half) % fineness_values - half;
 }
 
-/// The distance nearest to another one.
-double distance_of(Fineness fineness, double near) {
-  return near * std::exp2(static_cast<double>(steps_coarser(fineness, fineness_from(near))) /
+/// The spacing nearest to another one.
+double spacing_of(Fineness fineness, double near) {
+  return near * std::exp2(static_cast<double>(steps_coarser(fineness, fineness_of(near))) /
                           steps_per_octave);
 }
 
@@ -189,6 +191,7 @@ struct Neighbour {
   PreparedCamera camera;
   Eigen::Isometry3d camera_from_world;
   CloudCache::Cloud cloud;
+  double pixel_size;  ///< of pixel_sizes()
 };
 
 /// The list without the view itself and without repeats, which would count as further views.
@@ -204,6 +207,16 @@ std::vector<std::size_t> distinct_others(const std::vector<std::size_t>& others,
   return distinct;
 }
 
+/// The angles of the views' pixels as shares of that of one view; 1 where there are no rays, and so
+/// no points.
+std::vector<double> pixel_sizes(const std::vector<View>& views) {
+  std::vector<double> sizes;
+  for (const View& view : views) sizes.push_back(median_pixel_angle(view.camera));
+  const double largest = *std::max_element(sizes.begin(), sizes.end());
+  for (double& size : sizes) size = size > 0 ? size / largest : 1;
+  return sizes;
+}
+
 /// `others`: as distinct_others() gives them.
 class Fusion {
  public:
@@ -212,6 +225,7 @@ class Fusion {
       : views_(views),
         options_(options),
         clouds_(views, maps, options.cache_bytes),
+        pixel_sizes_(pixel_sizes(views)),
         memberships_(views.size()),
         last_use_(views.size()) {
     for (std::size_t i = 0; i < views.size(); ++i) {
@@ -269,8 +283,12 @@ class Fusion {
   Neighbour neighbour(std::size_t number) {
     const View& view = views_[number];
     memberships_[number].begin(pixels_of(number));
-    return {number, &view, PreparedCamera(view.camera), view.world_from_camera.inverse(),
-            clouds_.get(number)};
+    return {number,
+            &view,
+            PreparedCamera(view.camera),
+            view.world_from_camera.inverse(),
+            clouds_.get(number),
+            pixel_sizes_[number]};
   }
 
   static std::size_t place_of(const Neighbour& view, int x, int y) {
@@ -295,9 +313,9 @@ class Fusion {
       const int index = self.cloud->index.at<int>(y, x);
       if (index == no_point || before[place_of(self, x, y)] != 0) continue;
       const CloudPoint& point = self.cloud->points[static_cast<std::size_t>(index)];
-      const double distance = distance_from(self, point);
+      const double spacing = spacing_at(self, point);
       Mean mean;
-      mean.add(point, distance);
+      mean.add(point, spacing);
       joined.clear();
       int seen_through = 0;
       bool is_known = false;
@@ -314,7 +332,7 @@ class Fusion {
       if (mean.count() < options_.min_views) continue;
       if (options_.min_views > 1 && seen_through > mean.count()) continue;
       row.push_back(mean.point());
-      mark(*now(self, x, y), fineness_from(distance));
+      mark(*now(self, x, y), fineness_of(spacing));
       for (const Joined& pixel : joined) mark(*pixel.now, pixel.fineness);
     }
   }
@@ -340,11 +358,11 @@ class Fusion {
     }
     const Eigen::Vector3d a = point.normal.cast<double>(), b = candidate.normal.cast<double>();
     if (degrees_between(a, b) > options_.max_normal_angle) return Finding::nothing;
-    const double distance = distance_from(other, candidate);
-    mean.add(candidate, distance);
+    const double spacing = spacing_at(other, candidate);
+    mean.add(candidate, spacing);
     const Fineness before = memberships_[other.number].before[place_of(other, x, y)];
-    joined.push_back({now(other, x, y), fineness_from(distance), before});
-    return before != 0 && distance_of(before, distance) <= as_fine * distance_from(self, point)
+    joined.push_back({now(other, x, y), fineness_of(spacing), before});
+    return before != 0 && spacing_of(before, spacing) <= as_fine * spacing_at(self, point)
                ? Finding::point_of_cloud
                : Finding::same_point;
   }
@@ -361,13 +379,15 @@ class Fusion {
     return along == 0 ? from_centre.norm() : normal.dot(from_centre) / along;
   }
 
-  static double distance_from(const Neighbour& view, const CloudPoint& point) {
-    return (view.camera_from_world * point.position.cast<double>()).norm();
+  /// Of the view's pixels where it sees a point, in an unknown unit.
+  static double spacing_at(const Neighbour& view, const CloudPoint& point) {
+    return view.pixel_size * (view.camera_from_world * point.position.cast<double>()).norm();
   }
 
   const std::vector<View>& views_;
   const FusionOptions& options_;
   CloudCache clouds_;
+  std::vector<double> pixel_sizes_;
   std::vector<Membership> memberships_;  // of each view, from its first use to its last
   std::vector<std::size_t> last_use_;    // of each view: the last one that may look at it
   PointCloud points_;

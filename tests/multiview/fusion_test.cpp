@@ -245,27 +245,40 @@ TEST_F(Fusion, CoarsePointsAreNotHandedOnToEverFinerPixels) {
   EXPECT_GT(10 * points_ahead(0), 7 * fine);
 }
 
-/// A wall 2 m ahead of one view and 1 m ahead of the other, where it is four times as fine.
+/// Two views of a wall 2 m ahead of the first one, which sees it half as finely as the other: from
+/// twice the distance, or through a lens of half the focal length.
+std::vector<Rig> coarse_and_fine() {
+  Rig farther = demo_rig(side);
+  farther.views[0].world_from_camera.setIdentity();
+  farther.views[1].world_from_camera = farther.views[0].world_from_camera;
+  Rig shorter = farther;
+  farther.views[1].world_from_camera.translation().z() = 1;
+  shorter.views[1].world_from_camera.translation().x() = 0.01;
+  shorter.views[0] = resized(shorter.views[0], side / 2, side / 2);
+  return {farther, shorter};
+}
+
+/// Points as fine as those of twice as far away are a quarter as many.
 TEST_F(Fusion, CoarsePointsDoNotStandForFinePixels) {
-  Rig rig = demo_rig(side);
-  rig.views[0].world_from_camera.setIdentity();
-  rig.views[1].world_from_camera = Eigen::Translation3d(0, 0, 1);
-  const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
-  const auto maps = [&scene](std::size_t i) {
-    return ViewMaps{
-        .distance = scene.views[i].truth.distance, .normals = {}, .image = {}, .confidence = {}};
-  };
-  const auto points_ahead = [&](const std::vector<std::size_t>& order) {
-    const std::vector<View> views = {scene.rig.views[order[0]], scene.rig.views[order[1]]};
-    const PointCloud cloud = fuse(views, {{1}, {0}}, [&](std::size_t i) { return maps(order[i]); });
-    return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
-      return point.position.head<2>().norm() < 0.5F;
-    });
-  };
-  const auto fine = points_ahead({1, 0});
-  const auto both = points_ahead({0, 1});
-  // The far view's come first and take a quarter of the near one's pixels.
-  EXPECT_GT(10 * both, 8 * fine);
+  for (const Rig& rig : coarse_and_fine()) {
+    const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
+    const auto maps = [&scene](std::size_t i) {
+      return ViewMaps{
+          .distance = scene.views[i].truth.distance, .normals = {}, .image = {}, .confidence = {}};
+    };
+    const auto points_ahead = [&](const std::vector<std::size_t>& order) {
+      const std::vector<View> views = {scene.rig.views[order[0]], scene.rig.views[order[1]]};
+      const PointCloud cloud =
+          fuse(views, {{1}, {0}}, [&](std::size_t i) { return maps(order[i]); });
+      return std::count_if(cloud.begin(), cloud.end(), [](const CloudPoint& point) {
+        return point.position.head<2>().norm() < 0.5F;
+      });
+    };
+    const auto fine = points_ahead({1, 0});
+    const auto both = points_ahead({0, 1});
+    // The coarse view's come first and take a quarter of the fine one's pixels.
+    EXPECT_GT(10 * both, 8 * fine);
+  }
 }
 
 /// What a view passes on of a wall is as fine as the finest point that its pixels are part of.
@@ -392,30 +405,29 @@ TEST_F(Fusion, PixelsFartherThanTheLargestDisplacementAreNotJoined) {
   }
 }
 
-/// Of a wall 2 m ahead of one view and 1 m ahead of the other, the nearer one knows four times as
-/// much.
-TEST_F(Fusion, NearViewsCountMore) {
-  Rig rig = demo_rig(side);
-  rig.views[0].world_from_camera.setIdentity();
-  rig.views[1].world_from_camera = Eigen::Translation3d(0, 0, 1);
-  const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
-  for (std::size_t i = 0; i < 2; ++i) {
-    views_[i] = scene.rig.views[i];
-    maps_[i] = {.distance = scene.views[i].truth.distance.clone(),
-                .normals = {},
-                .image = cv::Mat(side, side, CV_8UC3, cv::Scalar(0, 0, i == 0 ? 200 : 0)),
-                .confidence = {}};
-  }
-  const cv::Mat distance = 1.004 * maps_[0].distance;
-  const cv::Rect middle(side / 2 - 1, side / 2 - 1, 2, 2);
-  maps_[0].distance = cv::Mat::zeros(side, side, CV_32FC1);
-  distance(middle).copyTo(maps_[0].distance(middle));
-  const PointCloud cloud =
-      fuse({views_[0], views_[1]}, {{1}, {}}, [this](std::size_t i) { return maps_[i]; });
-  ASSERT_EQ(cloud.size(), static_cast<std::size_t>(middle.area()));
-  for (const CloudPoint& point : cloud) {
-    EXPECT_NEAR(point.red, 200 / 5.0, 2);
-    EXPECT_NEAR(point.position.z(), 2 * (1 + 0.004 / 5), 2e-4);
+/// A view that sees a wall twice as finely as another knows four times as much.
+TEST_F(Fusion, FineViewsCountMore) {
+  for (const Rig& rig : coarse_and_fine()) {
+    const RenderedPair scene = render_plane(rig, Eigen::Vector3d::UnitZ(), 2);
+    for (std::size_t i = 0; i < 2; ++i) {
+      views_[i] = scene.rig.views[i];
+      const cv::Mat& truth = scene.views[i].truth.distance;
+      maps_[i] = {.distance = truth.clone(),
+                  .normals = {},
+                  .image = cv::Mat(truth.size(), CV_8UC3, cv::Scalar(0, 0, i == 0 ? 200 : 0)),
+                  .confidence = {}};
+    }
+    const cv::Mat distance = 1.004 * maps_[0].distance;
+    const cv::Rect middle(distance.cols / 2 - 1, distance.rows / 2 - 1, 2, 2);
+    maps_[0].distance = cv::Mat::zeros(distance.size(), CV_32FC1);
+    distance(middle).copyTo(maps_[0].distance(middle));
+    const PointCloud cloud =
+        fuse({views_[0], views_[1]}, {{1}, {}}, [this](std::size_t i) { return maps_[i]; });
+    ASSERT_EQ(cloud.size(), static_cast<std::size_t>(middle.area()));
+    for (const CloudPoint& point : cloud) {
+      EXPECT_NEAR(point.red, 200 / 5.0, 2);
+      EXPECT_NEAR(point.position.z(), 2 * (1 + 0.004 / 5), 2e-4);
+    }
   }
 }
 
