@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <string>
 
 #include "calibration_commands.h"
@@ -21,19 +19,13 @@ struct ConvertArguments {
   double scale = 1;
 };
 
-/// The rig's, of images reduced, or enlarged, to that share of their width and height.
-ws::Rig scaled(ws::Rig rig, double scale) {
-  for (ws::View& view : rig.views) {
-    const auto side = [scale](int pixels) { return std::max(cvRound(scale * pixels), 1); };
-    view = ws::resized(view, side(view.camera.width), side(view.camera.height));
-  }
-  return rig;
-}
-
 void convert(const ConvertArguments& arguments) {
-  const ws::Calibration calibration = ws::read_calibration(arguments.input);
+  ws::Calibration calibration = ws::read_calibration(arguments.input);
   require_other_file(arguments.output.file, calibration.files);
-  arguments.output.write(scaled(calibration.rig, arguments.scale));
+  for (ws::View& view : calibration.rig.views) {
+    view.camera = ws::scaled(view.camera, arguments.scale);
+  }
+  arguments.output.write(calibration.rig);
   say("Wrote " + arguments.output.file + ".");
 }
 
@@ -47,8 +39,8 @@ void add_calibration_convert_command(CLI::App& group) {
   arguments->output.add_format_to(*command);
   command
       ->add_option("--scale", arguments->scale,
-                   "For images reduced (by averaging) to this share of their width and height, as "
-                   "0.5 of binned ones")
+                   "For images reduced (by averaging) by exactly this factor, as 0.5 of binned "
+                   "ones; the size is rounded")
       ->check(positive_number())
       ->capture_default_str();
   command->callback([arguments] { convert(*arguments); });

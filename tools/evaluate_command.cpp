@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -21,6 +22,8 @@ namespace ws = widestereo;
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr const char* calibration_of_set = "calib.yaml";
 
 struct EvaluateArguments {
   std::string prediction, normals, confidence;
@@ -65,13 +68,41 @@ int view_in_name(const fs::path& map, const fs::path& set) {
   return 0;
 }
 
-void choose_views(EvaluateArguments& a) {
-  a.view = a.view_of_map ? *a.view_of_map : a.set.empty() ? 0 : view_in_name(a.prediction, a.set);
-  a.source = a.source_of_map.value_or(a.view == 0 ? 1 : 0);
-  if (!a.view_of_map && a.view != 0) {
-    say(a.prediction + " is scored as of view " + std::to_string(a.view) +
-        ", by its name; --view chooses another.");
+/// Which of the calibration's cameras was the result's view of that number, as for matching they
+/// may have come in another order; none where the map has no record beside it.
+std::optional<int> camera_in_record(const fs::path& map, int view, const fs::path& calibration) {
+  using Json = nlohmann::ordered_json;
+  const Json record = record_in(map.parent_path());
+  const Json views = record.is_object() ? record.value("views", Json()) : Json();
+  const auto number = static_cast<std::size_t>(view);
+  if (!fs::exists(calibration) || !views.is_array() || number >= views.size() ||
+      !views[number].is_object()) {
+    return std::nullopt;
   }
+  const std::vector<ws::View> cameras = ws::read_calibration(calibration).rig.views;
+  const auto camera = std::find_if(cameras.begin(), cameras.end(), [&](const ws::View& other) {
+    return views[number].value("name", Json()) == Json(other.name);
+  });
+  if (camera == cameras.end()) return std::nullopt;
+  return static_cast<int>(camera - cameras.begin());
+}
+
+void choose_views(EvaluateArguments& a) {
+  if (a.view_of_map) {
+    a.view = *a.view_of_map;
+  } else if (!a.set.empty()) {
+    const int in_name = view_in_name(a.prediction, a.set);
+    const auto in_record = camera_in_record(
+        a.prediction, in_name,
+        a.calibration.empty() ? fs::path(a.set) / calibration_of_set : fs::path(a.calibration));
+    a.view = in_record.value_or(in_name);
+    if (a.view != 0 || in_name != 0) {
+      say(a.prediction + " is scored as of view " + std::to_string(a.view) +
+          (a.view == in_name ? ", by its name" : ", by the record beside it") +
+          "; --view chooses another.");
+    }
+  }
+  a.source = a.source_of_map.value_or(a.view == 0 ? 1 : 0);
 }
 
 /// Fills what was not named from a folder with depthN.tiff, validN.png, occN.png (or occN_M.png),
@@ -91,7 +122,7 @@ void take_from_set(EvaluateArguments& a) {
   take(a.truth_normals, "normal" + n + ".tiff");
   take(a.image, "cam" + n + ".png");
   take(a.field_of_view, "fov" + n + ".png");
-  take(a.calibration, "calib.yaml");
+  take(a.calibration, calibration_of_set);
   if (a.truth.empty()) throw ws::Error(a.set + " has no depth" + n + ".tiff; give --truth.");
   if (a.calibration.empty()) throw ws::Error(a.set + " has no calib.yaml; give --calibration.");
 }

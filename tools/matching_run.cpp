@@ -32,7 +32,8 @@ MatchSettings with_range(MatchSettings settings, const ws::CalibratedImages& ima
     if (!settings.max_distance) settings.max_distance = images.distances->farthest;
   } else if (!images.in_metres) {
     throw ws::Error(calibration +
-                    " has too few points in these images to tell how far the scene reaches; give "
+                    " has no points in these images, or too few, to tell how far the scene "
+                    "reaches; give "
                     "--min-distance and --max-distance.");
   }
   return settings;

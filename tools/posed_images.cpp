@@ -33,7 +33,8 @@ std::vector<Eigen::Vector3d> centres_of(const std::vector<ws::View>& views) {
 }  // namespace
 
 cv::Mat PosedImages::read(std::size_t image) const {
-  return size.reduced(white_level.read(files[image]), calibrated[image], files[image].string());
+  return size.reduced(white_level.read_of_many(files[image]), calibrated[image],
+                      files[image].string());
 }
 
 void PosedImageSettings::add_to(CLI::App& command) {

@@ -201,6 +201,7 @@ class Reconstruction {
   }
 
   const ResultFolders& folders() const { return folders_; }
+  bool is_of_one_frame() const { return images_.are_of_one_frame; }
 
  private:
   bool is_matched(std::size_t image) const { return matched_[image]; }
@@ -394,17 +395,20 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   Reconstruction reconstruction(arguments);
   reconstruction.run();
   const Json& record = reconstruction.folders().record();
+  double accepted = 0;
+  for (const Json& image : record["images"]) accepted += image["accepted"].get<double>();
+  const auto count = static_cast<double>(record["images"].size());
+  report_little_accepted(accepted / count,
+                         reconstruction.is_of_one_frame()
+                             ? "the order of the cameras"
+                             : "the poses (of the camera in the world, or of the IMU)");
   if (arguments.as_json) {
     std::cout << ws::to_text(record) << "\n";
     return;
   }
-  double accepted = 0;
-  for (const Json& image : record["images"]) accepted += image["accepted"].get<double>();
-  const auto count = static_cast<double>(record["images"].size());
   std::printf("%.0f images, %.1f %% accepted on average; %zu points in %s\n", count,
               100 * accepted / count, record["cloud"]["points"].get<std::size_t>(),
               (reconstruction.folders().folder() / cloud_name).string().c_str());
-  report_little_accepted(accepted / count, "the poses (of the camera in the world, or of the IMU)");
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "geometry/angle.h"
 #include "input_record.h"
 #include "option_checks.h"
+#include "say.h"
 #include "temporary_folder.h"
 #include "text/formatted.h"
 #include "text/json_text.h"
@@ -303,19 +304,18 @@ void report_nearest(const std::vector<ws::ViewResult>& views, double min_distanc
     nearest += cv::countNonZero((distance > 0) & (distance < near * min_distance));
   }
   if (nearest <= much * accepted) return;
-  std::printf(
-      "%.0f %% of what was accepted lies at the nearest distance, and is wrong where the scene is "
-      "nearer: give a smaller --min-distance.\n",
-      100 * nearest / accepted);
+  say(
+      ws::formatted("%.0f %% of what was accepted lies at the nearest distance, and is wrong where "
+                    "the scene is nearer: give a smaller --min-distance.",
+                    100 * nearest / accepted));
 }
 
 void report_little_accepted(double share, const std::string& first_cause) {
   constexpr double little = 0.4;  // pairs that fit have half or more (docs/accuracy.md)
   if (share >= little) return;
-  std::printf(
-      "Little was accepted: check %s, the calibration and its unit, and the range of distances "
-      "(`widestereo calibration check`).\n",
-      first_cause.c_str());
+  say("Little was accepted: check " + first_cause +
+      ", the calibration and its unit, and the range of distances (`widestereo calibration "
+      "check`).");
 }
 
 void FolderFormat::add_maps_to(CLI::App& command) {

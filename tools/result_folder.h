@@ -56,11 +56,12 @@ void add_png_scale_of_input(CLI::App& command, const std::string& option,
 /// Throws Error where it was given for a map that has none.
 void require_scaled_png(const std::string& option, double scale, const std::filesystem::path& map);
 
-/// Says what to check where so little is accepted of all views that the images hardly fit their
-/// calibration.
+/// Says, on standard error, what to check where so little is accepted of all views that the images
+/// hardly fit their calibration.
 void report_little_accepted(double share, const std::string& first_cause);
 
-/// Says so where much of what was accepted lies at the nearest distance that was looked for.
+/// Says so, on standard error, where much of what was accepted lies at the nearest distance that
+/// was looked for.
 void report_nearest(const std::vector<widestereo::ViewResult>& views, double min_distance);
 
 struct FolderContents {

@@ -72,7 +72,7 @@ struct Selection {
 
 std::vector<cv::Mat> read_images(const ws::SequenceFrame& frame, const WhiteLevel& white_level) {
   std::vector<cv::Mat> images;
-  for (const fs::path& path : frame.images) images.push_back(white_level.read(path));
+  for (const fs::path& path : frame.images) images.push_back(white_level.read_of_many(path));
   return images;
 }
 
@@ -393,6 +393,10 @@ void run_sequence(const SequenceArguments& arguments) {
   arguments.format.require_room_for(options.min_distance, options.max_distance);
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
+  double accepted = 0;
+  for (const Json& frame : run.folder().frames()) accepted += frame["accepted"].get<double>();
+  report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()),
+                         "the order of the cameras");
   if (arguments.as_json) {
     std::cout << ws::to_text(run.folder().record()) << "\n";
     return;
@@ -400,10 +404,6 @@ void run_sequence(const SequenceArguments& arguments) {
   std::printf("%zu frames are in %s\n", run.folder().frames().size(), arguments.output.c_str());
   summarise(run.folder().frames(), false);
   summarise(run.folder().frames(), true);
-  double accepted = 0;
-  for (const Json& frame : run.folder().frames()) accepted += frame["accepted"].get<double>();
-  report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()),
-                         "the order of the cameras");
 }
 
 }  // namespace

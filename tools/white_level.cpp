@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "say.h"
+#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
 namespace ws = widestereo;
@@ -26,4 +27,13 @@ cv::Mat WhiteLevel::read(const std::filesystem::path& file) const {
   say(file.string() + " has 16 bits, but no value above " + std::to_string(cvRound(brightest)) +
       ", and is taken for a dark image; where the camera has 12 bits, give --white-level 4095.");
   return image;
+}
+
+cv::Mat WhiteLevel::read_of_many(const std::filesystem::path& file) const {
+  try {
+    return read(file);
+  } catch (const ws::Error& error) {
+    throw ws::Error(error.what() +
+                    std::string(" Or remove it, and give --skip-incomplete to do without it."));
+  }
 }

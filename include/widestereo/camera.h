@@ -130,6 +130,11 @@ double model_max_theta(const Camera& camera);
 /// cx' = s (cx + 0.5) - 0.5). Throws Error where either size has no pixel; validates nothing else.
 Camera resized(const Camera& camera, int width, int height);
 
+/// The camera after its image was reduced, or enlarged, by exactly that factor both ways, as
+/// binning and cv::resize() with factors do; the size is rounded as there. Throws Error where no
+/// pixel is left, and for factors that are not positive or too large.
+Camera scaled(const Camera& camera, double factor);
+
 /// Unit rays of all pixels, CV_32FC4: (x, y, z, 1), or (x, y, z, 0) where the model has a ray but
 /// the field of view or the mask excludes the pixel, or zeros where there is no ray. `mask`: empty,
 /// or CV_8UC1 of the camera's size, 0 = excluded. Throws Error for other masks and for cameras that

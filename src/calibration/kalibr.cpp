@@ -87,10 +87,20 @@ struct KalibrForm {
   std::vector<double> coefficients;
 };
 
-template <class T>
-std::vector<std::string> texts_of(const std::vector<T>& numbers) {
+/// With a point before an exponent, without which YAML 1.1, and so Kalibr's reader, takes it for a
+/// word.
+std::string yaml_text(double number) {
+  std::string text = text_of(number);
+  const std::size_t exponent = text.find('e');
+  if (exponent != std::string::npos && text.find('.') == std::string::npos) {
+    text.insert(exponent, ".0");
+  }
+  return text;
+}
+
+std::vector<std::string> texts_of(const std::vector<double>& numbers) {
   std::vector<std::string> texts;
-  for (const T number : numbers) texts.push_back(text_of(number));
+  for (const double number : numbers) texts.push_back(yaml_text(number));
   return texts;
 }
 
@@ -176,16 +186,15 @@ std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
     out << YAML::Key << "distortion_coeffs" << YAML::Value << YAML::Flow
         << calibration::texts_of(form.coefficients);
     out << YAML::Key << "resolution" << YAML::Value << YAML::Flow
-        << calibration::texts_of<int>({view.camera.width, view.camera.height});
+        << std::vector<int>{view.camera.width, view.camera.height};
     if (view.camera.max_theta < std::numbers::pi) {
       out << YAML::Key << calibration::max_theta_key << YAML::Value
-          << text_of(view.camera.max_theta * degrees_per_radian);
+          << calibration::yaml_text(view.camera.max_theta * degrees_per_radian);
     }
     const auto motion = [&out](const char* key, const Eigen::Matrix4d& t) {
       out << YAML::Key << key << YAML::Value << YAML::BeginSeq;
       for (int row = 0; row < 4; ++row) {
-        out << YAML::Flow
-            << calibration::texts_of<double>({t(row, 0), t(row, 1), t(row, 2), t(row, 3)});
+        out << YAML::Flow << calibration::texts_of({t(row, 0), t(row, 1), t(row, 2), t(row, 3)});
       }
       out << YAML::EndSeq;
     };
@@ -194,7 +203,7 @@ std::string kalibr_text(const std::filesystem::path& path, const Rig& rig) {
     }
     if (has_time_offsets) {
       out << YAML::Key << calibration::time_offset_key << YAML::Value
-          << text_of(view.imu_time_offset);
+          << calibration::yaml_text(view.imu_time_offset);
     }
     if (i > 0) motion("T_cn_cnm1", source_from_reference(view, rig.views[i - 1]).matrix());
     out << YAML::EndMap;

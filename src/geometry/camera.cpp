@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
@@ -12,6 +13,7 @@
 #include "geometry/camera_parameters.h"
 #include "geometry/dual.h"
 #include "geometry/validation.h"
+#include "text/number.h"
 #include "text/size_text.h"
 #include "widestereo/error.h"
 
@@ -331,13 +333,14 @@ double model_max_theta(const Camera& camera) {
   return inside;
 }
 
-Camera resized(const Camera& camera, int width, int height) {
+namespace {
+
+/// Of an image that is sx times as wide and sy times as high, but for what the size leaves out.
+Camera scaled_apart(const Camera& camera, double sx, double sy, int width, int height) {
   if (camera.width < 1 || camera.height < 1 || width < 1 || height < 1) {
     throw Error("Cannot resize a camera of " + size_text(camera.width, camera.height) + " to " +
                 size_text(width, height) + "; both must have at least one pixel.");
   }
-  const double sx = static_cast<double>(width) / camera.width;
-  const double sy = static_cast<double>(height) / camera.height;
   Camera result = camera;
   result.width = width;
   result.height = height;
@@ -348,6 +351,22 @@ Camera resized(const Camera& camera, int width, int height) {
   result.cx = sx * (camera.cx + 0.5) - 0.5;
   result.cy = sy * (camera.cy + 0.5) - 0.5;
   return result;
+}
+
+}  // namespace
+
+Camera resized(const Camera& camera, int width, int height) {
+  return scaled_apart(camera, static_cast<double>(width) / camera.width,
+                      static_cast<double>(height) / camera.height, width, height);
+}
+
+Camera scaled(const Camera& camera, double factor) {
+  const double largest = std::numeric_limits<int>::max();
+  if (!(factor > 0 && factor * std::max(camera.width, camera.height) < largest)) {
+    throw Error("A camera cannot be scaled by " + text_of(factor) + "; give a positive factor.");
+  }
+  return scaled_apart(camera, factor, factor, cvRound(factor * camera.width),
+                      cvRound(factor * camera.height));
 }
 
 cv::Mat ray_image(const Camera& camera, const cv::Mat& mask) {

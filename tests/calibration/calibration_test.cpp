@@ -11,7 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <regex>
 #include <set>
+#include <sstream>
 
 #include "bytes_of.h"
 #include "comma_locale.h"
@@ -844,6 +846,36 @@ TEST_P(WritingCameras, AsKalibrDoes) {
   const bool is_radtan = c.model == CameraModel::pinhole_radtan || c.model == CameraModel::mei;
   expect_held(!has_no_form.contains(c.model) && c.skew == 0 && !(is_radtan && c.k3 != 0),
               write_kalibr);
+}
+
+/// Kalibr reads camchains by PyYAML, for which -5e-04 is a word: numbers are as the YAML 1.1
+/// specification has them (int and float types).
+TEST(Writing, NumbersOfCamchainsAreNumbersInYaml11) {
+  const TemporaryFolder folder;
+  Rig rig = read_calibration(folder.write("chain.yaml", kalibr_text)).rig;
+  Camera& camera = rig.views[0].camera;
+  camera = test::make_camera(CameraModel::kannala_brandt, 640, 480, 1e5, 300, 320.5, 240);
+  camera.k1 = -0.0005;
+  camera.k2 = 1e-30;
+  camera.k3 = 1.25e-7;
+  rig.views[1].world_from_camera.translation().y() = 2e-05;
+  rig.views[1].imu_time_offset = -3e-06;
+  write_kalibr(folder / "again.yaml", rig);
+  const std::string text = bytes_of(folder / "again.yaml");
+  for (const char* number : {"-5.0e-04", "1.0e-30", "1.25e-07", "1.0e+05"}) {
+    EXPECT_NE(text.find(number), std::string::npos) << number << "\n" << text;
+  }
+  const std::regex number("[-+]?([0-9]+|[0-9]+\\.[0-9]*([eE][-+][0-9]+)?)");
+  std::istringstream words(std::regex_replace(text, std::regex("[,\\[\\]]"), " "));
+  int count = 0;
+  for (std::string word; words >> word;) {
+    if (word == "-" || std::string("-+.0123456789").find(word.front()) == std::string::npos) {
+      continue;
+    }
+    EXPECT_TRUE(std::regex_match(word, number)) << word;
+    ++count;
+  }
+  EXPECT_GT(count, 30);
 }
 
 TEST(Writing, NamesAModelThatKalibrLacksBeforeItsSkew) {

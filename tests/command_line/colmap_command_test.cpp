@@ -127,7 +127,7 @@ TEST_F(ColmapCommand, MasksAndFieldsOfViewApply) {
   const Outcome outcome =
       run(depth("model", "colmap") + "--max-theta 50 --json --mask " + file("mask.png"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_EQ(nlohmann::json::parse(outcome.output)["views"][1]["max_theta_degrees"], 50);
+  EXPECT_EQ(json_of(outcome)["views"][1]["max_theta_degrees"], 50);
   EXPECT_EQ(cv::countNonZero(distance_in("colmap").colRange(0, 48)), 0);
   EXPECT_GT(cv::countNonZero(distance_in("colmap").colRange(48, 96)), 500);
 }
@@ -423,6 +423,9 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
 }
 
 TEST_F(ReconstructCommand, ImagesThatAreMissingMayBeLeftOut) {
+  folder_.write("images/away.png", "");
+  expect_error(reconstruct(),
+               "away.png is empty; give an image file. Or remove it, and give --skip-incomplete");
   std::filesystem::remove(folder_ / "images/away.png");
   expect_error(reconstruct(), "away.png is missing (1 of 3 images in " + file("model") + " are)");
   expect_error(reconstruct(), "leave them out by --skip-incomplete");

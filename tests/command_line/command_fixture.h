@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -27,6 +28,16 @@ struct Outcome {
   int exit_code = -1;
   std::string output;  ///< standard output and error
 };
+
+/// What was printed as JSON, after sentences on standard error.
+inline nlohmann::json json_of(const Outcome& outcome) {
+  std::size_t begin = 0;
+  while (begin < outcome.output.size() && outcome.output[begin] != '{' &&
+         outcome.output[begin] != '[') {
+    begin = std::min(outcome.output.find('\n', begin), outcome.output.size() - 1) + 1;
+  }
+  return nlohmann::json::parse(outcome.output.substr(begin));
+}
 
 /// A text as a word of the shell, or part of one.
 inline std::string shell_word(const std::string& text) {

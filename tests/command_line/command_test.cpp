@@ -49,7 +49,7 @@ TEST_F(Command, DemoShowsPanoramas) {
   const Outcome outcome =
       run("demo --panorama --size 72 --preset fast --device cpu --json -o " + file("demo"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  const nlohmann::json record = json_of(outcome);
   EXPECT_EQ(record["views"][0]["model"], "equirectangular");
   EXPECT_EQ(record["views"][1]["width"], 144);
   const nlohmann::json& behind = record["scores"][5];
@@ -61,7 +61,7 @@ TEST_F(Command, DemoLooksAround) {
   const Outcome outcome =
       run("demo --surround --size 128 --preset fast --device cpu --json -o " + file("demo"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  const nlohmann::json record = json_of(outcome);
   ASSERT_EQ(record["views"].size(), 4u);
   for (const nlohmann::json& view : record["views"]) {
     EXPECT_GT(view["accepted"].get<double>(), 0.75) << view["name"];
@@ -75,7 +75,7 @@ TEST_F(Command, DepthWritesEveryFormatAndJson) {
   const Outcome outcome =
       run(depth_of("left.png", "right.png") + "--formats tiff,exr,pfm,png --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  const nlohmann::json record = json_of(outcome);
   EXPECT_EQ(record["views"].size(), 2u);
   const cv::Mat tiff = cv::imread(file("out/distance0.tiff"), cv::IMREAD_UNCHANGED);
   const cv::Mat png = cv::imread(file("out/distance0.png"), cv::IMREAD_UNCHANGED);
@@ -96,7 +96,7 @@ TEST_F(Command, DepthRecordsMasks) {
   const Outcome outcome =
       run(depth_of("left.png", "right.png") + "--json --mask " + file("mask.png"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  const nlohmann::json record = json_of(outcome);
   EXPECT_EQ(record["input"].value("masks", nlohmann::json()),
             nlohmann::json::array({file("mask.png")}));
 }
@@ -207,7 +207,7 @@ TEST_F(MovingCamera, OfARealCarFitsItsPoses) {
           "794042.png --max-theta 95 --json -c " + (set / "calib.yaml").string() + " --poses " +
           (set / "poses_cam_to_world.txt").string());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_LT(nlohmann::json::parse(outcome.output)["median_pixels"].get<double>(), 0.4);
+  EXPECT_LT(json_of(outcome)["median_pixels"].get<double>(), 0.4);
 }
 
 TEST_F(Command, BadImagesAreNamed) {
@@ -324,7 +324,7 @@ TEST_F(RefusedWords, WholeNumbersAreDecimalDigits) {
       run("demo --size 00064 --seed +010 --preset fast --device cpu --json --no-pictures -o " +
           file("decimal"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_EQ(nlohmann::json::parse(outcome.output)["options"]["seed"], 10);
+  EXPECT_EQ(json_of(outcome)["options"]["seed"], 10);
 }
 
 TEST_F(RefusedWords, NamesAreListed) {
@@ -363,7 +363,7 @@ TEST_F(Command, LevelsKeepTheFinestOnesNumbers) {
             " -o " + file("out") + " --preset fast --device cpu --no-cloud --no-pictures --json" +
             " --min-distance 0.4 --max-distance 8 " + options);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-    return nlohmann::json::parse(outcome.output);
+    return json_of(outcome);
   };
   const nlohmann::json by_size = record_with("");
   const nlohmann::json preset = by_size["options"];
@@ -465,7 +465,7 @@ TEST_F(FewerBits, AreMatchedLikeAllBitsWhereTheWhiteLevelIsGiven) {
   const cv::Mat of_dark = map();
   const Outcome given = run(depth_of("left16.png", "right16.png") + "--white-level 255 --json");
   ASSERT_EQ(given.exit_code, 0) << given.output;
-  EXPECT_EQ(nlohmann::json::parse(given.output)["input"]["white_level"], 255);
+  EXPECT_EQ(json_of(given)["input"]["white_level"], 255);
   const cv::Mat of_given = map();
   const Outcome whole = run(depth_of("left.png", "right.png"));
   EXPECT_EQ(whole.output.find(advice), std::string::npos) << whole.output;
@@ -635,7 +635,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   const Outcome outcome = run("evaluate " + file("prediction.tiff") + common +
                               " --json --error-map " + file("error.png"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json record = nlohmann::json::parse(outcome.output);
+  const nlohmann::json record = json_of(outcome);
   const nlohmann::json& scores = record["regions"];
   EXPECT_TRUE(record["sparsification"].empty());
   EXPECT_EQ(scores[0]["bad_relative"]["0.01"], 1.0);
@@ -649,7 +649,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
   const Outcome curve = run("evaluate " + file("prediction.tiff") + common +
                             " --json --confidence " + file("confidence.tiff"));
   ASSERT_EQ(curve.exit_code, 0) << curve.output;
-  const nlohmann::json points = nlohmann::json::parse(curve.output)["sparsification"];
+  const nlohmann::json points = json_of(curve)["sparsification"];
   ASSERT_EQ(points.size(), 10u);
   EXPECT_EQ(points[9]["confidence"], 0.5);
   expect_error(
@@ -673,7 +673,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
                           " --far-distance ";
   const Outcome near_by = run(far + "2 --json --field-of-view " + file("fov.png"));
   ASSERT_EQ(near_by.exit_code, 0) << near_by.output;
-  const nlohmann::json both = nlohmann::json::parse(near_by.output);
+  const nlohmann::json both = json_of(near_by);
   EXPECT_EQ(both["far"]["right"], 1.0);
   EXPECT_GT(both["far"]["pixels"], 1000);
   const auto textured =
@@ -698,7 +698,7 @@ TEST_F(Command, EvaluateScoresAndRefuses) {
 TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   Outcome outcome = run("calibration show " + file("calib.yaml") + " --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json shown = nlohmann::json::parse(outcome.output);
+  const nlohmann::json shown = json_of(outcome);
   EXPECT_EQ(shown["views"][0]["model"], "double_sphere");
   EXPECT_NEAR(shown["pairs"][0]["baseline_metres"].get<double>(), 0.1, 1e-12);
   outcome = run("calibration show " + file("calib.yaml"));
@@ -710,7 +710,7 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
   write_calibration_with_imu();
   outcome = run("calibration show " + file("imucam.yaml") + " --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json imu = nlohmann::json::parse(outcome.output)["imu"];
+  const nlohmann::json imu = json_of(outcome)["imu"];
   EXPECT_EQ(imu["position_in_first_metres"], nlohmann::json({0.05, -0.04, -0.07}));
   EXPECT_NEAR(imu["rotation_degrees"].get<double>(), 120, 1e-9);
   outcome = run("calibration show " + file("imucam.yaml"));
@@ -767,7 +767,7 @@ cam1:
 )");
   const Outcome outcome = run("calibration show " + file("wide.yaml") + " --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json shown = nlohmann::json::parse(outcome.output);
+  const nlohmann::json shown = json_of(outcome);
   const nlohmann::json& view = shown["views"][0];
   const auto degrees = [](double tangent) { return 2 * std::atan(tangent) * degrees_per_radian; };
   EXPECT_NEAR(view["horizontal_field_of_view_degrees"], degrees(150 / 50.), 1e-6);
@@ -909,7 +909,7 @@ TEST_F(Command, CalibrationIsRefined) {
   const std::string refine = "calibration refine " + pair + again + "-c " + file("turned.yaml");
   Outcome outcome = run(refine + " --json -o " + file("refined.json") + " --to basalt");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json json = nlohmann::json::parse(outcome.output);
+  const nlohmann::json json = json_of(outcome);
   EXPECT_EQ(json["frames"], 2);
   EXPECT_GT(json["pairs"][0]["median_pixels_before"].get<double>(), 0.3);
   EXPECT_LT(json["pairs"][0]["median_pixels_after"].get<double>(), 0.02);
@@ -975,8 +975,7 @@ TEST_F(Command, CalibrationIsRefined) {
   outcome = run("calibration refine " + pair + flat + "-c " + file("turned.yaml") + " --json -o " +
                 file("again.yaml"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_EQ(2 * nlohmann::json::parse(outcome.output)["pairs"][0]["matches"].get<int>(),
-            json["pairs"][0]["matches"]);
+  EXPECT_EQ(2 * json_of(outcome)["pairs"][0]["matches"].get<int>(), json["pairs"][0]["matches"]);
   outcome = run(refine + " --intrinsics -o " + file("refined.yaml"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("cam1  f by "), std::string::npos) << outcome.output;
@@ -1024,6 +1023,7 @@ TEST_F(ShiftedPair, SwappedImagesAreMatchedWithAHint) {
     return outcome.output.find("Little was accepted: check the order") != std::string::npos;
   };
   EXPECT_TRUE(has_hint(file("right.png") + " " + file("left.png")));
+  EXPECT_TRUE(has_hint("--json " + file("right.png") + " " + file("left.png")));
   EXPECT_FALSE(has_hint(file("left.png") + " " + file("right.png")));
 }
 
@@ -1112,7 +1112,7 @@ TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
   outcome = run(calibration("check", "left.png", copy_of("left.png")));
   EXPECT_NE(outcome.output.find("no feature is near enough"), std::string::npos) << outcome.output;
   outcome = run(calibration("check", "left.png", copy_of("left.png")) + "--json");
-  EXPECT_TRUE(nlohmann::json::parse(outcome.output)["distance_p5"].is_null()) << outcome.output;
+  EXPECT_TRUE(json_of(outcome)["distance_p5"].is_null()) << outcome.output;
 }
 
 TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
@@ -1125,7 +1125,7 @@ TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
   // Both images are the same: the distance is infinite.
   Outcome outcome = run(synthesis("far.tiff", " --json --picture " + file("warped.png")));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json right = nlohmann::json::parse(outcome.output);
+  const nlohmann::json right = json_of(outcome);
   EXPECT_GT(right["above_0.9"].get<double>(), 0.99);
   EXPECT_GT(right["windows"].get<long>(), 5000);
   EXPECT_EQ(cv::imread(file("warped.png"), cv::IMREAD_UNCHANGED).size(), cv::Size(96, 96));
@@ -1134,7 +1134,7 @@ TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
   const std::size_t scores = outcome.output.find('{');
   EXPECT_NE(outcome.output.substr(0, scores).find("The images are hardly alike"),
             std::string::npos);
-  EXPECT_LT(nlohmann::json::parse(outcome.output.substr(scores))["above_0.9"].get<double>(), 0.1);
+  EXPECT_LT(json_of(outcome)["above_0.9"].get<double>(), 0.1);
   outcome = run(synthesis("far.tiff", ""));
   EXPECT_NE(outcome.output.find("textured windows"), std::string::npos) << outcome.output;
   expect_error(synthesis("none.tiff", ""), "none.tiff");
@@ -1147,7 +1147,7 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
                              file("speed.json") + " --plot " + file("speed.svg");
   const Outcome outcome = run(common + " --json --peak-gflops 1 --peak-gtexels 1000");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json rows = nlohmann::json::parse(outcome.output);
+  const nlohmann::json rows = json_of(outcome);
   std::ifstream stream(folder_ / "speed.json");
   EXPECT_EQ(nlohmann::json::parse(stream), rows);
   ASSERT_EQ(rows.size(), 1u);
@@ -1183,7 +1183,7 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
       run("benchmark --devices cpu --presets fast --sizes 64 --runs 1 --warp exact --filter exact "
           "--json");
   ASSERT_EQ(exact.exit_code, 0) << exact.output;
-  const nlohmann::json exact_row = nlohmann::json::parse(exact.output)[0];
+  const nlohmann::json exact_row = json_of(exact)[0];
   EXPECT_EQ(exact_row["options"]["warp"], "exact");
   EXPECT_EQ(exact_row["options"]["filter"], "exact");
   EXPECT_GT(exact_row["on_device"]["operations"], 1.3 * operations) << "the warp of each sample";

@@ -160,7 +160,7 @@ TEST_F(Command, BenchmarkTakesSeveralWindowRadii) {
   const Outcome outcome =
       run("benchmark --devices cpu --presets fast --sizes 64 --runs 1 --window-radii 1,2 --json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json rows = nlohmann::json::parse(outcome.output);
+  const nlohmann::json rows = json_of(outcome);
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0]["window_radius"], 1);
   EXPECT_EQ(rows[1]["window_radius"], 2);
@@ -221,7 +221,7 @@ class EvaluateSets : public Command {
     const Outcome outcome = run("evaluate " + file("prediction.tiff") + " --json " + arguments);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
     double all = unknown, visible = unknown;
-    const nlohmann::json scores = nlohmann::json::parse(outcome.output);
+    const nlohmann::json scores = json_of(outcome);
     for (const nlohmann::json& region : scores.at("regions")) {
       if (region["region"] == "all") all = region["bad_relative"]["0.05"];
       if (region["region"] == "non-occluded") visible = region["bad_relative"]["0.05"];
@@ -272,7 +272,7 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
   const Outcome outcome = run("evaluate " + file("prediction.tiff") + " --json --far-distance 2" +
                               " --view 1 --source 0 --set " + file("set"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  EXPECT_GT(nlohmann::json::parse(outcome.output)["far"]["pixels"], 1000);
+  EXPECT_GT(json_of(outcome)["far"]["pixels"], 1000);
   // By the name of the map, where the set has such a view.
   for (const char* name : {"distance1.tiff", "distance_accepted1.tiff", "distance7.tiff"}) {
     fs::copy_file(file("prediction.tiff"), file(name));
@@ -280,6 +280,22 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
     EXPECT_EQ(said.find("is scored as of view 1, by its name") != std::string::npos,
               std::string(name) != "distance7.tiff")
         << said;
+  }
+  // By the result's record, whose views may be the cameras in another order.
+  folder_.write("result.json", R"({"views": [{"name": "cam1"}, {"name": "cam0"}, 3]})");
+  const auto says = [this](const std::string& arguments, const char* text) {
+    const std::string said = run("evaluate " + arguments + " --set " + file("set")).output;
+    EXPECT_NE(said.find(text), std::string::npos) << said;
+  };
+  fs::copy_file(file("prediction.tiff"), file("distance0.tiff"));
+  says(file("distance0.tiff"), "is scored as of view 1, by the record beside it");
+  says(file("distance1.tiff"), "is scored as of view 0, by the record beside it");
+  EXPECT_EQ(run("evaluate " + file("distance0.tiff") + " --view 0 --set " + file("set"))
+                .output.find("is scored"),
+            std::string::npos);
+  for (const char* record : {R"({"views": [{"name": "left"}, {"name": 7}]})", "[]", "{"}) {
+    folder_.write("result.json", record);
+    says(file("distance1.tiff"), "is scored as of view 1, by its name");
   }
 }
 

@@ -177,7 +177,7 @@ TEST_F(Output, DistancePngsOfAnyScaleAreRead) {
     const Outcome outcome = run("evaluate " + file(distance) + " -c " + file("calib.yaml") +
                                 " --json --truth " + file(truth));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
-    return nlohmann::json::parse(outcome.output)["regions"][0]["median_relative"].get<double>();
+    return json_of(outcome)["regions"][0]["median_relative"].get<double>();
   };
   EXPECT_LT(median("out/distance0.png --png-scale 500"), 0.01);
   EXPECT_LT(median("out/distance0.tiff --truth-png-scale 500", "out/distance0.png"), 0.01);

@@ -106,7 +106,7 @@ TEST_F(SequenceCommand, ResumesWithTheSameBits) {
   fs::create_directories(folder_ / "parts/.unfinished");
   const Outcome rest = run(sequence("parts") + options + "--json");
   ASSERT_EQ(rest.exit_code, 0) << rest.output;
-  EXPECT_EQ(nlohmann::json::parse(rest.output)["frames"].size(), 3u);
+  EXPECT_EQ(json_of(rest)["frames"].size(), 3u);
   EXPECT_FALSE(fs::exists(folder_ / "parts/.unfinished"));
   expect_same_results("whole", "parts");
   const Outcome again = run(sequence("parts") + options);
@@ -457,6 +457,24 @@ TEST_F(SequenceCommand, FramesThatAreGoneAreRemovedWithTheNextNewOne) {
   EXPECT_FALSE(fs::exists(folder_ / "out/001"));
 }
 
+TEST_F(SequenceCommand, ADamagedImageIsDoneWithoutOnceItIsRemoved) {
+  const std::string damaged = file("data/cam1/001.png");
+  folder_.write("data/cam1/001.png", bytes_of(damaged).substr(0, 500));
+  const Outcome failed = run(sequence());
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_NE(failed.output.find(damaged +
+                               " is truncated or damaged; copy it again. Or remove it, and give "
+                               "--skip-incomplete to do without it."),
+            std::string::npos)
+      << failed.output;
+  EXPECT_EQ(record()["frames"].size(), 1u);
+  fs::remove(damaged);
+  const Outcome outcome = run(sequence() + "--skip-incomplete");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  ASSERT_EQ(record()["frames"].size(), 2u);
+  EXPECT_EQ(record()["frames"][1]["name"], "002");
+}
+
 TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
   std::string poses = "# seconds, of the frames that are chosen\n";
   for (int camera = 0; camera < 2; ++camera) {
@@ -482,7 +500,7 @@ TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
       "--poses " + file("poses.txt") + " --first 1 --restart-below 0 --json";
   const Outcome outcome = run(sequence("out", "euroc") + options);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
-  const nlohmann::json frames = nlohmann::json::parse(outcome.output)["frames"];
+  const nlohmann::json frames = json_of(outcome)["frames"];
   ASSERT_EQ(frames.size(), 2u);
   EXPECT_EQ(frames[0]["name"], "001");
   EXPECT_EQ(frames[1]["motion"], "poses");

@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <set>
 
@@ -656,6 +657,34 @@ TEST(Resizing, ScalesTheAxesApart) {
   }
   EXPECT_THROW(resized(camera, 0, 10), Error);
   EXPECT_THROW(resized(Camera(), 10, 10), Error);
+}
+
+TEST(Resizing, ByAFactorIsExactWhereSizesAreRounded) {
+  Camera camera = cameras()[5].camera;  // with skew
+  for (const auto& [side, reduced_side] : {std::pair(201, 100), {203, 102}, {200, 100}}) {
+    camera.width = side;
+    camera.height = 161;
+    // Whose pixels tell where they were.
+    cv::Mat columns(161, side, CV_32FC1);
+    for (int x = 0; x < side; ++x) columns.col(x) = cv::Scalar(x);
+    cv::Mat reduced;
+    cv::resize(columns, reduced, {}, 0.5, 0.5, cv::INTER_AREA);
+    const Camera half = scaled(camera, 0.5);
+    validate(half, "half");
+    EXPECT_EQ(cv::Size(half.width, half.height), reduced.size());
+    EXPECT_EQ(half.width, reduced_side);
+    Vector3d full_ray;
+    Vector3d half_ray;
+    const double column = reduced.at<float>(30, 40);
+    ASSERT_TRUE(unproject(camera, {column, 2 * 30 + 0.5}, full_ray));
+    ASSERT_TRUE(unproject(half, {40, 30}, half_ray));
+    EXPECT_LT((full_ray - half_ray).norm(), 1e-12);
+  }
+  EXPECT_EQ(scaled(camera, 1), camera);
+  EXPECT_EQ(scaled(scaled(camera, 2), 0.5), camera);
+  for (const double factor : {0.0, -1.0, 1e-9, 1e9, std::nan("")}) {
+    EXPECT_THROW(scaled(camera, factor), Error) << factor;
+  }
 }
 
 TEST(RayImage, RefusesWhatDoesNotFit) {
