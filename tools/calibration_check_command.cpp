@@ -50,11 +50,20 @@ double error_before_cameras(const ws::View& first, const ws::View& second,
   }
 }
 
+Eigen::Vector2d last_pixel(const ws::View& view) {
+  return {view.camera.width - 1, view.camera.height - 1};
+}
+
 /// What was mistaken for what, where that explains the matches better than anything else.
 std::string mistake(const ws::View& first, const ws::View& second,
                     const std::vector<ws::PixelMatch>& matches) {
   std::vector<ws::PixelMatch> swapped = matches;
   for (ws::PixelMatch& match : swapped) std::swap(match.first, match.second);
+  std::vector<ws::PixelMatch> turned = matches;
+  for (ws::PixelMatch& match : turned) {
+    match.first = last_pixel(first) - match.first;
+    match.second = last_pixel(second) - match.second;
+  }
   ws::View first_there = first;
   ws::View second_there = second;
   std::swap(first_there.world_from_camera, second_there.world_from_camera);
@@ -64,7 +73,8 @@ std::string mistake(const ws::View& first, const ws::View& second,
   const std::pair<const char*, double> remedies[] = {
       {"swap the images", error_before_cameras(first, second, swapped)},
       {"invert the poses", error_before_cameras(first_there, second_there, matches)},
-      {"turn the baseline round (-T)", error_before_cameras(first, opposite, matches)}};
+      {"turn the baseline round (-T)", error_before_cameras(first, opposite, matches)},
+      {"turn both images by 180 degrees", error_before_cameras(first, second, turned)}};
   double least = of_these_cameras;
   for (const auto& remedy : remedies) least = std::min(least, remedy.second);
   std::string words;

@@ -51,9 +51,10 @@ bool share_field_of_view(const View& first, const View& second);
 /// direction, 0.2 % of focal length (rays hardly tell a factor that all cameras share) and one
 /// pixel of principal point. Minimises Sampson's epipolar error (Hartley, Zisserman, Multiple View
 /// Geometry, 2nd ed., section 11.4.3, with rays in place of homogeneous pixels), robustly, so that
-/// false matches do no harm. Of three views or more a pair is left out that has fewer than 8
-/// matches, or whose matches contradict each other or lie behind the cameras, as those of views do
-/// that look away from each other. Throws Error for a rig that validate() refuses, when a pair
+/// false matches do no harm; those whose rays meet behind a camera, or ten times nearer than most,
+/// are left out. Of three views or more a pair is left out that has fewer than 8 matches, or whose
+/// matches contradict each other or lie behind the cameras, as those of views do that look away
+/// from each other. Throws Error for a rig that validate() refuses, when a pair
 /// names no two views of the rig, when the pairs do not connect every view with view 0, directly or
 /// by others, or when matches contradict each other, lie behind the cameras, or move a view by more
 /// than five times the accuracy above: images of other cameras or times can be fitted, too.

@@ -63,13 +63,6 @@ std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
   return best;
 }
 
-/// Distance along the first ray to the point nearest to both rays, from the angles of the triangle.
-double triangulated_distance(const Eigen::Vector3d& ray, const Eigen::Vector3d& other,
-                             const Eigen::Vector3d& centre) {
-  const Eigen::Vector3d normal = ray.cross(other);
-  return centre.cross(other).dot(normal) / normal.squaredNorm();
-}
-
 /// What a pair of views says of a match.
 struct TriangulatedMatch {
   double pixels = 0;               ///< in the second image, to the epipolar curve
@@ -195,7 +188,7 @@ RangeReport check_range(const View& first, const View& second,
                 std::to_string(max_distance) + " holds none; give 0 < min < max.");
   }
   constexpr double on_curve = 1;      // pixels
-  constexpr double out_of_range = 2;   // pixels
+  constexpr double out_of_range = 2;  // pixels
   const EpipolarGeometry geometry(first, second, "The check of the range");
   RangeReport report;
   std::vector<double> distances;

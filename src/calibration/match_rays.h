@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Dense>
 
 #include "widestereo/epipolar.h"
 #include "widestereo/rig.h"
@@ -33,5 +33,14 @@ class MatchRays {
   const View& second_;
   PreparedCamera first_camera_, second_camera_;
 };
+
+/// Distance along a ray to the point nearest to it and to another view's ray, from the angles of
+/// the triangle; below 0 where that lies behind. `centre`: of the other view, from that of the
+/// first.
+inline double triangulated_distance(const Eigen::Vector3d& ray, const Eigen::Vector3d& other,
+                                    const Eigen::Vector3d& centre) {
+  const Eigen::Vector3d normal = ray.cross(other);
+  return centre.cross(other).dot(normal) / normal.squaredNorm();
+}
 
 }  // namespace widestereo

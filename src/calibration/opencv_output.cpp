@@ -22,6 +22,11 @@ namespace {
 struct OpenCvForm {
   std::vector<double> coefficients;
   std::optional<double> xi = std::nullopt;  ///< of cv::omnidir
+
+  bool is_fisheye() const { return !xi && coefficients.size() == 4; }
+  bool is_of_one_kind_with(const OpenCvForm& other) const {
+    return xi.has_value() == other.xi.has_value() && is_fisheye() == other.is_fisheye();
+  }
 };
 
 /// None where neither cv::fisheye nor cv::omnidir nor OpenCV's pinhole has the model.
@@ -74,7 +79,7 @@ void require_form(const Rig& rig, const std::vector<OpenCvForm>& forms,
          "OpenCV calibrates cameras of one image size with each other; choose Kalibr's or "
          "Basalt's format.");
   }
-  if (forms.front().xi.has_value() != forms.back().xi.has_value()) {
+  if (!forms.front().is_of_one_kind_with(forms.back())) {
     fail(path, "OpenCV calibrates cameras of one kind with each other, but " +
                    rig.views.front().name + " is " + to_string(first.model) + " and " +
                    rig.views.back().name + " is " + to_string(last.model) +

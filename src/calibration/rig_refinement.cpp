@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "calibration/match_rays.h"
 #include "geometry/angle.h"
 #include "statistics/percentile.h"
 #include "statistics/robust.h"
@@ -83,6 +84,7 @@ class Refinement {
  public:
   Refinement(const Rig& rig, const std::vector<ViewMatches>& pairs, bool intrinsics)
       : calibrated_(rig), rig_(rig), pairs_(pairs) {
+    for (const ViewMatches& pair : pairs) counts_.emplace_back(pair.matches.size(), true);
     ViewUnknowns deviations;
     deviations << Eigen::Vector3d::Constant(rotation_deviation),
         Eigen::Vector2d::Constant(direction_deviation), focal_deviation,
@@ -97,16 +99,12 @@ class Refinement {
 
   const Rig& rig() const { return rig_; }
 
-  /// Gauss and Newton's steps.
   void solve() {
-    for (int step = 0; step < most_steps; ++step) {
-      linearise();
-      const Eigen::VectorXd update = -information_.ldlt().solve(gradient_);
-      if (!update.allFinite()) return;
-      for (std::size_t view = 0; view < rig_.views.size(); ++view) {
-        move(view, update.segment<unknowns_per_view>(place(view)));
-      }
-      if (update.cwiseQuotient(deviations_).cwiseAbs().maxCoeff() < last_step) return;
+    step_to_minimum();
+    // Only where the rig is nearly right do distances tell which matches are false.
+    for (int round = 0; round < 2; ++round) {
+      leave_out_unlikely_matches();
+      step_to_minimum();
     }
   }
 
@@ -130,6 +128,53 @@ class Refinement {
   }
 
  private:
+  /// Gauss and Newton's steps.
+  void step_to_minimum() {
+    for (int step = 0; step < most_steps; ++step) {
+      linearise();
+      const Eigen::VectorXd update = -information_.ldlt().solve(gradient_);
+      if (!update.allFinite()) return;
+      for (std::size_t view = 0; view < rig_.views.size(); ++view) {
+        move(view, update.segment<unknowns_per_view>(place(view)));
+      }
+      if (update.cwiseQuotient(deviations_).cwiseAbs().maxCoeff() < last_step) return;
+    }
+  }
+
+  /// Matches whose rays do not meet before both cameras, or do at a small part of the distance of
+  /// most. False ones that happen to lie near their epipolar curves do so: the parallax that they
+  /// pretend to have turns the baseline, against which the others of a far scene are powerless.
+  void leave_out_unlikely_matches() {
+    constexpr double least_parallax = 0.005;  // radians, which noise does not make
+    constexpr double least_share = 0.1;
+    std::vector<PreparedCamera> cameras;
+    for (const View& view : rig_.views) cameras.emplace_back(view.camera);
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      const ViewMatches& pair = pairs_[i];
+      const View& first = rig_.views[pair.first];
+      const View& second = rig_.views[pair.second];
+      const Eigen::Vector3d between =
+          second.world_from_camera.translation() - first.world_from_camera.translation();
+      std::vector<double> distances;  // from the nearer camera
+      for (const PixelMatch& match : pair.matches) {
+        SeenRay a;
+        SeenRay b;
+        double& distance = distances.emplace_back(between.norm() / least_parallax);
+        if (!see(first, cameras[pair.first], match.first, a) ||
+            !see(second, cameras[pair.second], match.second, b)) {
+          continue;
+        }
+        if (a.direction.cross(b.direction).norm() <= least_parallax) continue;
+        distance = std::min(triangulated_distance(a.direction, b.direction, between),
+                            triangulated_distance(b.direction, a.direction, -between));
+      }
+      std::vector<double> sorted = distances;
+      const double least = least_share * percentile(sorted, 0.5);
+      counts_[i].clear();
+      for (const double distance : distances) counts_[i].push_back(distance > std::max(least, 0.0));
+    }
+  }
+
   Eigen::Index unknowns() const { return place(rig_.views.size()); }
   static Eigen::Index place(std::size_t view) {
     return static_cast<Eigen::Index>(view) * unknowns_per_view;
@@ -180,10 +225,12 @@ class Refinement {
     std::vector<PreparedCamera> cameras;
     for (const View& view : rig_.views) cameras.emplace_back(view.camera);
     std::vector<Residual> residuals;
-    for (const ViewMatches& pair : pairs_) {
-      for (const PixelMatch& match : pair.matches) {
+    for (std::size_t i = 0; i < pairs_.size(); ++i) {
+      for (std::size_t k = 0; k < pairs_[i].matches.size(); ++k) {
         Residual residual;
-        if (linearise(pair, match, cameras, residual)) residuals.push_back(residual);
+        if (counts_[i][k] && linearise(pairs_[i], pairs_[i].matches[k], cameras, residual)) {
+          residuals.push_back(residual);
+        }
       }
     }
     return residuals;
@@ -212,22 +259,36 @@ class Refinement {
     const Eigen::Vector2d by_second_pixel = b.by_pixel.transpose() * by_b;
     const double slope = std::sqrt(by_first_pixel.squaredNorm() + by_second_pixel.squaredNorm());
     if (!(slope > 1e-9)) return false;  // at both epipoles every plane holds both rays
+    residual.error = baseline.dot(normal) / slope;
+    // The slope changes, too: where parallax is no larger than noise, it decides where the error is
+    // least. With intrinsics it hardly does.
+    const Eigen::Vector3d u = a.by_pixel * by_first_pixel / slope;
+    const Eigen::Vector3d w = b.by_pixel * by_second_pixel / slope;
+    const Eigen::Vector3d slope_by_baseline = u.cross(b.direction) + a.direction.cross(w);
+    const Eigen::Vector3d slope_by_second_centre =
+        (slope_by_baseline - slope_by_baseline.dot(baseline) * baseline) / between.norm();
+    const Eigen::Vector3d slope_by_first_turn =
+        a.direction.cross(w.cross(baseline)) + u.cross(by_a);
+    const Eigen::Vector3d slope_by_second_turn =
+        b.direction.cross(baseline.cross(u)) + w.cross(by_b);
     const auto by_unknowns = [&](std::size_t view, const SeenRay& ray,
-                                 const Eigen::Vector3d& by_ray, const Eigen::Vector2d& by_pixel,
+                                 const Eigen::Vector3d& by_turn, const Eigen::Vector2d& by_pixel,
                                  const Eigen::Vector3d& by_centre) {
       const Eigen::Vector3d from_view_0 = arm(rig_, view);
       ViewUnknowns by;
       // A pixel stays where it is: the larger its image, the nearer to the axis its ray.
-      by << ray.direction.cross(by_ray),
-          from_view_0.norm() * across(from_view_0).transpose() * by_centre,
+      by << by_turn, from_view_0.norm() * across(from_view_0).transpose() * by_centre,
           -by_pixel.dot(ray.from_centre), -by_pixel;
       return ViewUnknowns(by.cwiseProduct(refined_.segment<unknowns_per_view>(place(view))) /
                           slope);
     };
-    residual.error = baseline.dot(normal) / slope;
+    const Eigen::Vector3d by_centre = by_second_centre - residual.error * slope_by_second_centre;
     residual.views = {pair.first, pair.second};
-    residual.by = {by_unknowns(pair.first, a, by_a, by_first_pixel, -by_second_centre),
-                   by_unknowns(pair.second, b, by_b, by_second_pixel, by_second_centre)};
+    residual.by = {
+        by_unknowns(pair.first, a, a.direction.cross(by_a) - residual.error * slope_by_first_turn,
+                    by_first_pixel, -by_centre),
+        by_unknowns(pair.second, b, b.direction.cross(by_b) - residual.error * slope_by_second_turn,
+                    by_second_pixel, by_centre)};
     return true;
   }
 
@@ -261,9 +322,10 @@ class Refinement {
   const Rig& calibrated_;
   Rig rig_;
   const std::vector<ViewMatches>& pairs_;
-  Eigen::VectorXd deviations_;   ///< of the calibration
-  Eigen::VectorXd refined_;      ///< 1: the unknown is refined; 0: it stays
-  Eigen::MatrixXd information_;  ///< inverse covariance
+  std::vector<std::vector<bool>> counts_;  ///< which of each pair's matches
+  Eigen::VectorXd deviations_;             ///< of the calibration
+  Eigen::VectorXd refined_;                ///< 1: the unknown is refined; 0: it stays
+  Eigen::MatrixXd information_;            ///< inverse covariance
   Eigen::VectorXd gradient_;
 };
 

@@ -954,6 +954,9 @@ TEST(Writing, OpenCvFilesAreThoseOfItsCalibrations) {
   bad.views[1].camera.model = CameraModel::mei;
   bad.views[1].camera.k3 = bad.views[1].camera.k4 = 0;
   expect(bad, "cam0 is kannala_brandt and cam1 is mei");
+  bad.views[1].camera.model = CameraModel::pinhole_radtan;
+  bad.views[1].camera.skew = 0;
+  expect(bad, "cam0 is kannala_brandt and cam1 is pinhole_radtan");
 }
 
 INSTANTIATE_TEST_SUITE_P(Models, WritingCameras, ::testing::ValuesIn(test::cameras()),

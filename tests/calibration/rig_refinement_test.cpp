@@ -184,6 +184,33 @@ TEST(RigRefinement, FalseMatchesDoNoHarm) {
   }
 }
 
+/// Parallax is no larger than noise there, and that of false matches a hundred times as large.
+TEST(RigRefinement, FarScenesTellDirectionsAsWellAsDeviationsSay) {
+  const Rig truth = true_rig();
+  const Rig calibrated = displaced(truth, 0.1);
+  for (const double false_matches : {0.0, 0.1}) {
+    double squares = 0;
+    constexpr int seeds = 6;
+    for (unsigned seed = 0; seed < seeds; ++seed) {
+      const RigRefinement refined =
+          refine_rig(calibrated, matches_of(truth,
+                                            {.nearest = 20,
+                                             .farthest = 100,
+                                             .noise = 0.3,
+                                             .false_matches = false_matches,
+                                             .seed = seed},
+                                            1500));
+      for (const std::size_t view : {1, 2}) {
+        EXPECT_LT(rotation_error(refined.rig, truth, view), 0.05);
+        squares += std::pow(degrees_between(arm(refined.rig, view), arm(truth, view)) /
+                                refined.views[view].direction.deviation,
+                            2);
+      }
+    }
+    EXPECT_LT(std::sqrt(squares / (2 * seeds)), 2.5) << false_matches;
+  }
+}
+
 TEST(RigRefinement, WhatMatchesDoNotTellStaysNearTheCalibration) {
   // Points at infinity tell rotations alone; their noise is taken for a little parallax.
   const Rig truth = true_rig();

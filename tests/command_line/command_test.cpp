@@ -1098,8 +1098,15 @@ TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
   // Their epipolar error is that of the right order.
   EXPECT_TRUE(
       says("calibration: wrong way round: swap the images, or invert the poses, or turn the "
-           "baseline round (-T)\n"))
+           "baseline round (-T), or turn both images by 180 degrees\n"))
       << outcome.output;
+  for (const char* image : {"left.png", "right.png"}) {
+    cv::Mat turned;
+    cv::rotate(cv::imread(file(image), cv::IMREAD_UNCHANGED), turned, cv::ROTATE_180);
+    cv::imwrite(file("turned_" + std::string(image)), turned);
+  }
+  outcome = run(calibration("check", "turned_left.png", "turned_right.png"));
+  EXPECT_TRUE(says("turn both images by 180 degrees")) << outcome.output;
   outcome = run(calibration("check", "left.png", "right.png"));
   EXPECT_NE(outcome.output.find("half below "), std::string::npos) << outcome.output;
   const nlohmann::json right_order =
