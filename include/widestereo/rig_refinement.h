@@ -54,10 +54,10 @@ bool share_field_of_view(const View& first, const View& second);
 /// false matches do no harm; those whose rays meet behind a camera, or ten times nearer than most,
 /// are left out. Of three views or more a pair is left out that has fewer than 8 matches, or whose
 /// matches contradict each other or lie behind the cameras, as those of views do that look away
-/// from each other. Throws Error for a rig that validate() refuses, when a pair
-/// names no two views of the rig, when the pairs do not connect every view with view 0, directly or
-/// by others, or when matches contradict each other, lie behind the cameras, or move a view by more
-/// than five times the accuracy above: images of other cameras or times can be fitted, too.
+/// from each other. Throws Error for a rig that validate() refuses, when a pair names no two views
+/// of the rig, when the pairs do not connect every view with view 0, directly or by others, or when
+/// matches contradict each other, lie behind the cameras, or move a view by more than five times
+/// the accuracy above: images of other cameras or times can be fitted, too.
 RigRefinement refine_rig(const Rig& rig, const std::vector<ViewMatches>& pairs,
                          bool intrinsics = false);
 

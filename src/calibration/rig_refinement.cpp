@@ -253,8 +253,6 @@ class Refinement {
     const Eigen::Vector3d normal = a.direction.cross(b.direction);
     const Eigen::Vector3d by_a = b.direction.cross(baseline);
     const Eigen::Vector3d by_b = baseline.cross(a.direction);
-    const Eigen::Vector3d by_second_centre =
-        (normal - normal.dot(baseline) * baseline) / between.norm();
     const Eigen::Vector2d by_first_pixel = a.by_pixel.transpose() * by_a;
     const Eigen::Vector2d by_second_pixel = b.by_pixel.transpose() * by_b;
     const double slope = std::sqrt(by_first_pixel.squaredNorm() + by_second_pixel.squaredNorm());
@@ -265,8 +263,6 @@ class Refinement {
     const Eigen::Vector3d u = a.by_pixel * by_first_pixel / slope;
     const Eigen::Vector3d w = b.by_pixel * by_second_pixel / slope;
     const Eigen::Vector3d slope_by_baseline = u.cross(b.direction) + a.direction.cross(w);
-    const Eigen::Vector3d slope_by_second_centre =
-        (slope_by_baseline - slope_by_baseline.dot(baseline) * baseline) / between.norm();
     const Eigen::Vector3d slope_by_first_turn =
         a.direction.cross(w.cross(baseline)) + u.cross(by_a);
     const Eigen::Vector3d slope_by_second_turn =
@@ -282,13 +278,15 @@ class Refinement {
       return ViewUnknowns(by.cwiseProduct(refined_.segment<unknowns_per_view>(place(view))) /
                           slope);
     };
-    const Eigen::Vector3d by_centre = by_second_centre - residual.error * slope_by_second_centre;
+    const Eigen::Vector3d by_baseline = normal - residual.error * slope_by_baseline;
+    const Eigen::Vector3d by_second_centre =
+        (by_baseline - by_baseline.dot(baseline) * baseline) / between.norm();
     residual.views = {pair.first, pair.second};
     residual.by = {
         by_unknowns(pair.first, a, a.direction.cross(by_a) - residual.error * slope_by_first_turn,
-                    by_first_pixel, -by_centre),
+                    by_first_pixel, -by_second_centre),
         by_unknowns(pair.second, b, b.direction.cross(by_b) - residual.error * slope_by_second_turn,
-                    by_second_pixel, by_centre)};
+                    by_second_pixel, by_second_centre)};
     return true;
   }
 

@@ -39,12 +39,13 @@ Rig rig_with_rotation_error(double degrees) {
   return rig;
 }
 
-std::vector<PixelMatch> exact_matches(const Rig& rig) {
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> unit(-1, 1);
+/// Of as many of the points that `next_point` gives, in the first camera's frame, as both see.
+template <typename NextPoint>
+std::vector<PixelMatch> matches_of_points(const Rig& rig, std::size_t count,
+                                          const NextPoint& next_point) {
   std::vector<PixelMatch> matches;
-  while (matches.size() < 400) {
-    const Eigen::Vector3d point(2 * unit(random), 2 * unit(random), 1.6 + 0.5 * unit(random));
+  while (matches.size() < count) {
+    const Eigen::Vector3d point = next_point();
     PixelMatch match;
     if (project(rig.views[0].camera, point, match.first) &&
         project(rig.views[1].camera, rig.views[1].world_from_camera.inverse() * point,
@@ -53,6 +54,14 @@ std::vector<PixelMatch> exact_matches(const Rig& rig) {
     }
   }
   return matches;
+}
+
+std::vector<PixelMatch> exact_matches(const Rig& rig) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  return matches_of_points(rig, 400, [&] {
+    return Eigen::Vector3d(2 * unit(random), 2 * unit(random), 1.6 + 0.5 * unit(random));
+  });
 }
 
 TEST(Epipolar, ExactMatchesHaveNoErrorAndTheirDistances) {
@@ -250,18 +259,9 @@ TEST(Epipolar, LeavesOutMatchesAtTheEpipole) {
 std::vector<PixelMatch> matches_at(const Rig& rig, double distance, std::size_t count) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
-  std::vector<PixelMatch> matches;
-  while (matches.size() < count) {
-    const Eigen::Vector3d point =
-        distance * Eigen::Vector3d(unit(random), unit(random), 1.5).normalized();
-    PixelMatch match;
-    if (project(rig.views[0].camera, point, match.first) &&
-        project(rig.views[1].camera, rig.views[1].world_from_camera.inverse() * point,
-                match.second)) {
-      matches.push_back(match);
-    }
-  }
-  return matches;
+  return matches_of_points(rig, count, [&]() -> Eigen::Vector3d {
+    return distance * Eigen::Vector3d(unit(random), unit(random), 1.5).normalized();
+  });
 }
 
 TEST(Range, OfDistancesIsCheckedByFeatures) {
