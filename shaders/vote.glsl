@@ -21,14 +21,18 @@
 #define NEAR_HANDICAP 0.4f
 // Random slot; the search and the regression use lower ones.
 #define VOTE_SLOT 72
-// Pixels around whose intensities tell the gain: radius and step of their grid, and the rounds over them.
-#define GAIN_RADIUS 20
-#define GAIN_STEP 10
-#define GAIN_ROUNDS 2
+// Pixels around whose intensities tell the exposure: radius and step of their grid, and the rounds over them.
+#define EXPOSURE_RADIUS 20
+#define EXPOSURE_STEP 10
+#define EXPOSURE_ROUNDS 3
 // Intensity, in both images, that stands for a gain of one where nothing else tells it.
 #define GAIN_OF_ONE 0.01f
-// A difference of 1 / 32, eight grey levels, halves the weight.
-#define DOUBT_PER_DIFFERENCE 32.0f
+// Variance of intensity, of 1.1 grey levels, that stands for a gain which is the ratio of brightness, without an offset,
+// and the least share of that ratio which a gain is.
+#define VARIANCE_OF_RATIO 2e-5f
+#define LEAST_GAIN 0.05f
+// Differences of 1 / 4 in the second round, and of 1 / 16 in the third, quarter the weight.
+#define DOUBT_PER_DIFFERENCE 4.0f
 
 // The pixel whose plane is candidate i.
 FN ivec2 vote_candidate_at(CONTEXT_ARGUMENT ivec2 pixel, int i) {
@@ -54,32 +58,51 @@ FN float remoteness_of_voter(CONTEXT_ARGUMENT ivec2 q, int dx, int dy, float fal
                       root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
 }
 
-// How many times brighter the reference is than the source around the pixel, for exposures and vignetting differ: from
-// the pixels that passed check_for_vote_pixel(), which has left what the source shows of them.
-FN float gain_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
+// What the reference shows is this gain (x) times what the source does, plus this offset (y), around the pixel, for
+// exposures, vignetting, black levels, tone curves and veils of light differ: from the pixels that passed
+// check_for_vote_pixel(), which has left what the source shows of them.
+FN vec2 exposure_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
-  float gain = 1.0f;
-  // What differs more than noise after the first round is not the same point.
-  for (int round = 0; round < GAIN_ROUNDS; ++round) {
-    float sum_a = GAIN_OF_ONE;
-    float sum_b = GAIN_OF_ONE;
-    for (int dy = -GAIN_RADIUS; dy <= GAIN_RADIUS; dy += GAIN_STEP) {
-      for (int dx = -GAIN_RADIUS; dx <= GAIN_RADIUS; dx += GAIN_STEP) {
+  vec2 exposure = vec2(1.0f, 0.0f);
+  // What differs more than noise is not the same point. Few of those may tilt a line, so that the ratio comes first, of
+  // which the same points may differ more.
+  for (int round = 0; round < EXPOSURE_ROUNDS; ++round) {
+    float doubt_per_difference = DOUBT_PER_DIFFERENCE * float(round * round);
+    float n = 1e-6f;
+    float sum_a = 0.0f;
+    float sum_b = 0.0f;
+    float sum_bb = 0.0f;
+    float sum_ab = 0.0f;
+    for (int dy = -EXPOSURE_RADIUS; dy <= EXPOSURE_RADIUS; dy += EXPOSURE_STEP) {
+      for (int dx = -EXPOSURE_RADIUS; dx <= EXPOSURE_RADIUS; dx += EXPOSURE_STEP) {
         ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
         if (!in_image(size, q)) continue;
         vec4 checked = check_at(CONTEXT REFERENCE, q);
         float a = intensity_at(CONTEXT REFERENCE, q);
         float b = checked.z;
         if (checked.w != 0.0f || int(checked.x) != source || min(a, b) < 0.0f) continue;
-        float doubt = (a - gain * b) * DOUBT_PER_DIFFERENCE;
-        float weight = round == 0 ? 1.0f : 1.0f / (1.0f + doubt * doubt);
+        float doubt = (a - exposure.x * b - exposure.y) * doubt_per_difference;
+        float root = 1.0f / (1.0f + doubt * doubt);
+        float weight = root * root;
+        n += weight;
         sum_a += weight * a;
         sum_b += weight * b;
+        sum_bb += weight * b * b;
+        sum_ab += weight * a * b;
       }
     }
-    gain = sum_a / sum_b;
+    float ratio = (GAIN_OF_ONE + sum_a) / (GAIN_OF_ONE + sum_b);
+    exposure = vec2(ratio, 0.0f);
+    if (round > 0) {
+      // The line of least squares, drawn to the one through zero as far as there is no contrast to tell it.
+      float mean_b = sum_b / n;
+      float prior = (n + 2.0f) * VARIANCE_OF_RATIO;
+      float gain = (sum_ab - sum_a * mean_b + prior * ratio) / (max(sum_bb - sum_b * mean_b, 0.0f) + prior);
+      gain = max(gain, LEAST_GAIN * ratio);
+      exposure = vec2(gain, (sum_a - gain * sum_b) / n);
+    }
   }
-  return gain;
+  return exposure;
 }
 
 // The source that tells most about the pixel: that of the check, unless the pixel was filled since. `velocity`: the
@@ -96,13 +119,13 @@ FN int checked_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, OUT(vec2)
 }
 
 // From 1 down by the mean squared difference of intensity over the middle of the patch, weighted by a tent as those at its
-// rim may lie beyond an edge, in units of the darker image. It must not explain a wrong plane by a gain of its own, as a
-// correlation of so few pixels could.
-FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, float gain) {
+// rim may lie beyond an edge, in units of the darker image. It must not explain a wrong plane by an exposure of its
+// own, as a correlation of so few pixels could.
+FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 exposure) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   // Noise does not count for more where the source is the darker one.
-  float per_unit = 1.0f / max(gain, 1.0f);
+  float per_unit = 1.0f / max(exposure.x, 1.0f);
   float n = 0.0f;
   float sum = 0.0f;
   PatchStart start;
@@ -115,7 +138,7 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, fl
         float a = intensity_at(CONTEXT REFERENCE, ivec2(pixel.x + first + dx, pixel.y + dy));
         float b = sample_image(CONTEXT source, camera.size, map_offset(CONTEXT row, float(dx)));
         if (min(a, b) < 0.0f) continue;
-        float difference = min(abs(a - gain * b) * per_unit, LARGEST_DIFFERENCE);
+        float difference = min(abs(a - exposure.x * b - exposure.y) * per_unit, LARGEST_DIFFERENCE);
         float weight = float((VOTE_MIDDLE_RADIUS + 1 - abs(first + dx)) * (VOTE_MIDDLE_RADIUS + 1 - abs(dy)));
         n += weight;
         sum += weight * difference * difference;
@@ -220,12 +243,13 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     // Where nothing competes, as on most surfaces, nothing needs to be sampled.
     if (count == 1) count = 0;
     float best = 0.0f;
-    float gain = count > 0 ? gain_around(CONTEXT source, pixel) : 1.0f;
+    vec2 exposure = vec2(1.0f, 0.0f);
+    if (count > 0) exposure = exposure_around(CONTEXT source, pixel);
     for (int k = 0; k < count; ++k) {
       vec4 plane = hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
       if (votes[k] <= best) continue;
-      float likeness = likeness_of_middle(CONTEXT source, pixel, m, gain);
+      float likeness = likeness_of_middle(CONTEXT source, pixel, m, exposure);
       // Of thin surfaces there are fewer pixels around than of what is behind them: what the images show must outweigh that.
       float score = votes[k] * (likeness * likeness * likeness);
       if (score > best) {

@@ -86,5 +86,29 @@ TEST(Contrast, OfHazyImagesIsStretchedAsThatOfDarkOnes) {
   }
 }
 
+/// A veil of light over one camera, or a black level, changes intensities, but not what they show.
+TEST(Contrast, AnOffsetInOneCameraCostsLittle) {
+  const RenderedPair pair = render_demo(128);
+  const auto wrong_by_a_pixel = [&](double gain, double offset) {
+    std::vector<cv::Mat> images;
+    for (const cv::Mat& image : images_of(pair)) {
+      images.push_back(to_grey_levels(image, "demo"));
+    }
+    images[1].convertTo(images[1], CV_8UC1, gain, offset);
+    Options options = Options::preset_named("fast");
+    std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+    Device device = Device::open("cpu");
+    const ViewResult view = Matcher(device, pair.rig, options).match(images).views[0];
+    const std::vector<RegionScores> scores =
+        evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
+    EXPECT_EQ(scores[1].region, "non-occluded");
+    return scores[1].bad_pixels.at(1.0);
+  };
+  const double as_rendered = wrong_by_a_pixel(1, 0);
+  EXPECT_LT(as_rendered, 0.03);
+  EXPECT_LT(wrong_by_a_pixel(0.5, 100), as_rendered + 0.01);
+  EXPECT_LT(wrong_by_a_pixel(0.5, 0), as_rendered + 0.01);
+}
+
 }  // namespace
 }  // namespace widestereo::test

@@ -115,22 +115,24 @@ TEST_F(Vote, NearPlanesCountForMoreThanMoreOfThemFarAway) {
 }
 
 TEST_F(Vote, WhatIsNotSeenIsAsUnlikeAsCanBe) {
-  const auto likeness = [&](float plane, float gain) {
-    return kernel::cpu::likeness_of_middle(fixture_.context(), 1, {48, 48}, {0, 0, plane}, gain);
+  const auto likeness = [&](float plane, kernel::vec2 exposure) {
+    return kernel::cpu::likeness_of_middle(fixture_.context(), 1, {48, 48}, {0, 0, plane},
+                                           exposure);
   };
-  for (const auto& [reference, source, gain] :
-       {std::tuple(0.4f, 0.38f, 1.0f), {0.8f, 0.38f, 2.0f}}) {
+  for (const auto& [reference, source, exposure] : {std::tuple(0.4f, 0.38f, kernel::vec2(1, 0)),
+                                                    {0.8f, 0.38f, kernel::vec2(2, 0)},
+                                                    {0.8f, 0.38f, kernel::vec2(1, 0.4f)}}) {
     fixture_.view(0).image().setTo(reference);
     fixture_.view(1).image().setTo(source);
     fixture_.interpolate();
-    EXPECT_NEAR(likeness(far_plane, gain), 0.5, 0.005) << "of differences in the darker image";
+    EXPECT_NEAR(likeness(far_plane, exposure), 0.5, 0.005) << "of differences in the darker image";
   }
   fixture_.view(1).image().setTo(0);
   fixture_.interpolate();
-  const float least = likeness(far_plane, 1);
+  const float least = likeness(far_plane, {1, 0});
   fixture_.view(1).image().setTo(MASKED_INTENSITY);
   fixture_.interpolate();
-  EXPECT_FLOAT_EQ(likeness(far_plane, 1), least);
+  EXPECT_FLOAT_EQ(likeness(far_plane, {1, 0}), least);
 }
 
 TEST_F(Vote, ElectsNoPlaneThatIsOutOfRange) {
@@ -195,6 +197,28 @@ TEST(VoteOnATexturedWall, WhatPassedTheChecksTellsHowExposuresDiffer) {
   }
 }
 
+/// A veil of light, a black level or a tone curve of one camera adds to what it shows.
+TEST(VoteBetweenExposures, ContrastTellsGainAndOffset) {
+  KernelFixture fixture(fisheye_rig(96), wide_range("fast"));
+  fixture.set_reference(0);
+  for (const auto& [gain, offset] :
+       {std::pair(1.0f, 0.0f), {0.6f, 0.0f}, {1.6f, -0.3f}, {0.5f, 0.3f}, {0.15f, 0.5f}}) {
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 96; ++x) {
+        const float shown = 0.3f + 0.05f * static_cast<float>((3 * x / 10 + 5 * y / 10) % 7);
+        const bool other_point = (x / 10 + 3 * (y / 10)) % 10 == 0;
+        fixture.view(0).image()(y, x) = gain * shown + offset;
+        fixture.view(0).checks(y, x) = cv::Vec4f(1, 0, other_point ? 1 - shown : shown, 0);
+      }
+    }
+    const kernel::vec2 exposure = kernel::cpu::exposure_around(fixture.context(), 1, {48, 48});
+    for (const float shown : {0.3f, 0.6f}) {
+      EXPECT_NEAR(exposure.x * shown + exposure.y, gain * shown + offset, 0.01)
+          << gain << " and " << offset;
+    }
+  }
+}
+
 TEST(VoteInOneOfTwoSources, AsksTheSourceOfTheCheck) {
   KernelFixture fixture(rig_of_baselines(96, {0.5, 1}), wide_range("fast"));
   fixture.set_reference(0);
@@ -206,8 +230,11 @@ TEST(VoteInOneOfTwoSources, AsksTheSourceOfTheCheck) {
           x / 10 % 2 == 0 ? cv::Vec4f(1, 0, 0.25f, 0) : cv::Vec4f(2, 0, 0.5f, 0);
     }
   }
-  EXPECT_NEAR(kernel::cpu::gain_around(fixture.context(), 1, {48, 48}), 2, 0.01);
-  EXPECT_NEAR(kernel::cpu::gain_around(fixture.context(), 2, {48, 48}), 1, 0.01);
+  for (const auto& [source, gain] : {std::pair(1, 2.0f), {2, 1.0f}}) {
+    const kernel::vec2 exposure = kernel::cpu::exposure_around(fixture.context(), source, {48, 48});
+    EXPECT_NEAR(exposure.x, gain, 0.03) << "source " << source;
+    EXPECT_NEAR(exposure.y, 0, 0.01) << "source " << source;
+  }
   const auto asked = [&] {
     kernel::vec2 velocity;
     const kernel::vec3 ray = to_kernel(fixture.view(0).rays(48, 48));
