@@ -64,8 +64,8 @@ FN float remoteness_of_voter(CONTEXT_ARGUMENT ivec2 q, int dx, int dy, float fal
 FN vec2 exposure_around(CONTEXT_ARGUMENT int source, ivec2 pixel) {
   ivec4 size = PARAMETERS.cameras[REFERENCE].size;
   vec2 exposure = vec2(1.0f, 0.0f);
-  // What differs more than noise is not the same point. Few of those may tilt a line, so that the ratio comes first, of
-  // which the same points may differ more.
+  // What differs by more than noise is not the same point. A few such points tilt a line, but hardly change the ratio:
+  // that comes first, and what lies off it is doubted less.
   for (int round = 0; round < EXPOSURE_ROUNDS; ++round) {
     float doubt_per_difference = DOUBT_PER_DIFFERENCE * float(round * round);
     float n = 1e-6f;
