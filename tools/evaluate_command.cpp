@@ -242,8 +242,7 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
   command->add_option("--view", a->view_of_map,
                       "Camera of the distance map (default 0, or with --set the one that the "
-                      "result's record names, or "
-                      "else the number in its name)");
+                      "result's record names, or else the number in its name)");
   command->add_option(
       "--source", a->source_of_map,
       "Camera in which displacements are measured (default 1, or 0 for another view)");

@@ -101,10 +101,9 @@ TEST(Contrast, AnOffsetInOneCameraCostsLittle) {
   const RenderedPair pair = render_demo(128);
   const auto wrong = [&](const std::string& name, double gain, double offset) {
     const std::vector<cv::Mat> images = images_of(pair);
-    const double share = wrong_by_a_pixel(
-        pair,
-        match(pair.rig, {seen_through(images[0], 1, 0), seen_through(images[1], gain, offset)}, 1)
-            .views[0]);
+    const StereoResult result =
+        match(pair.rig, {seen_through(images[0], 1, 0), seen_through(images[1], gain, offset)}, 1);
+    const double share = wrong_by_a_pixel(pair, result.views[0]);
     RecordProperty(name, std::to_string(share));
     return share;
   };

@@ -232,7 +232,7 @@ TEST(VoteInOneOfTwoSources, AsksTheSourceOfTheCheck) {
   }
   for (const auto& [source, gain] : {std::pair(1, 2.0f), {2, 1.0f}}) {
     const kernel::vec2 exposure = kernel::cpu::exposure_around(fixture.context(), source, {48, 48});
-    EXPECT_NEAR(exposure.x, gain, 0.03) << "source " << source;
+    EXPECT_NEAR(exposure.x, gain, 0.01) << "source " << source;
     EXPECT_NEAR(exposure.y, 0, 0.01) << "source " << source;
   }
   const auto asked = [&] {
