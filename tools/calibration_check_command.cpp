@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibration_commands.h"
+#include "calibration_fit.h"
 #include "matching_run.h"
 #include "option_checks.h"
 #include "pose_settings.h"
@@ -30,13 +31,8 @@ struct CheckArguments {
   bool as_json = false;
 };
 
-// Pixels of median epipolar error: of a calibration that will do, and of the right one at all.
-constexpr double usable = 1;
+/// Pixels of median epipolar error, of the right calibration at all.
 constexpr double of_these_cameras = 3;
-
-/// Then the epipolar error tells nothing: where cameras look the same way, it is as small with one
-/// in the other's place.
-bool lie_behind(const ws::EpipolarReport& report) { return report.behind > 0.5; }
 
 /// The median epipolar error, of points before the cameras; infinite where they are not.
 double error_before_cameras(const ws::View& first, const ws::View& second,
@@ -84,10 +80,6 @@ std::string mistake(const ws::View& first, const ws::View& second,
     words += (words.empty() ? "" : ", or ") + std::string(words_of_it);
   }
   return words;
-}
-
-bool will_do(const ws::EpipolarReport& report) {
-  return !lie_behind(report) && report.median_pixels < usable;
 }
 
 std::string verdict_of(const ws::EpipolarReport& report, const ws::View& first,

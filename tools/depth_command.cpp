@@ -7,6 +7,7 @@
 #include <system_error>
 #include <vector>
 
+#include "calibration_fit.h"
 #include "commands.h"
 #include "match_settings.h"
 #include "matching_run.h"
@@ -98,6 +99,7 @@ void run_depth(const DepthArguments& arguments) {
 
   const std::vector<ws::PixelMatch> features = features_of_pair(images);
   const std::vector<double> blurs = arguments.sharpness.blurs(rig, images, features);
+  report_calibration_errors(rig, features, model || arguments.poses.given());
   report_features_out_of_range(rig, features, options, calibrated.in_metres ? " m" : "");
   const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);
   FolderContents contents{

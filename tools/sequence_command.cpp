@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration_fit.h"
 #include "commands.h"
 #include "frame_settings.h"
 #include "input_record.h"
@@ -128,6 +129,7 @@ Selection select_frames(const SequenceArguments& a) {
   a.rig.leave_out_dark_rims(selection.rig, first);
   const std::vector<ws::PixelMatch> features = features_of_pair(first);
   selection.blurs = a.sharpness.blurs(selection.rig, first, features);
+  report_calibration_errors(selection.rig, features, false);
   report_features_out_of_range(selection.rig, features, a.settings.options(), " m");
   if (a.poses.given()) {
     selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen,

@@ -117,6 +117,12 @@ class Command : public ::testing::Test {
     alter("right.png", 60);
   }
 
+  /// Writes mono.yaml: the first camera of calib.yaml alone.
+  void write_first_camera() {
+    const std::string text = bytes_of("calib.yaml");
+    folder_.write("mono.yaml", text.substr(0, text.find("cam1:")));
+  }
+
   /// Writes imucam.yaml: calib.yaml with an IMU at (0.05, -0.04, -0.07) m in the frame of cam0,
   /// turned by 120 degrees.
   void write_calibration_with_imu() {

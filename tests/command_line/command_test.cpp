@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
@@ -12,6 +13,7 @@
 #include "geometry/angle.h"
 #include "replaced.h"
 #include "same_bits.h"
+#include "text/formatted.h"
 #include "widestereo/calibration.h"
 
 namespace widestereo::test {
@@ -135,8 +137,7 @@ class MovingCamera : public Command {
  protected:
   void SetUp() override {
     Command::SetUp();
-    const std::string text = bytes_of("calib.yaml");
-    folder_.write("mono.yaml", text.substr(0, text.find("cam1:")));
+    write_first_camera();
   }
   std::string depth_at(const std::string& poses, const std::string& output) {
     folder_.write("poses.txt", poses);
@@ -897,13 +898,16 @@ TEST_F(Command, SharperImageIsBlurred) {
       << check.output;
 }
 
+/// calib.yaml with its second camera turned about the baseline.
+std::string turned(const std::string& calibration, double degrees) {
+  const double c = std::cos(degrees * radians_per_degree);
+  const double s = std::sin(degrees * radians_per_degree);
+  return replaced(calibration, "[0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]",
+                  formatted("[0.0, %.8f, %.8f, 0.0]\n  - [0.0, %.8f, %.8f, 0.0]", c, -s, s, c));
+}
+
 TEST_F(Command, CalibrationIsRefined) {
-  std::string text = bytes_of("calib.yaml");
-  // Turned by two degrees about the baseline.
-  const std::string rows = "[0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]";
-  text = replaced(text, rows,
-                  "[0.0, 0.99939083, -0.03489950, 0.0]\n  - [0.0, 0.03489950, 0.99939083, 0.0]");
-  folder_.write("turned.yaml", text);
+  folder_.write("turned.yaml", turned(bytes_of("calib.yaml"), 2));
   const std::string pair = file("left.png") + " " + file("right.png") + " ";
   const std::string again = file(copy_of("left.png")) + " " + file(copy_of("right.png")) + " ";
   const std::string refine = "calibration refine " + pair + again + "-c " + file("turned.yaml");
@@ -931,10 +935,7 @@ TEST_F(Command, CalibrationIsRefined) {
       << "as calibrated";
   EXPECT_NEAR(limited.views[1].camera.max_theta, CV_PI, 1e-9) << "likewise";
   EXPECT_EQ(verdict("turned.yaml").find("calibration: good"), std::string::npos);
-  // Turned by four and by twelve degrees.
-  folder_.write("off.yaml", replaced(bytes_of("calib.yaml"), rows,
-                                     "[0.0, 0.99756405, -0.06975647, 0.0]\n"
-                                     "  - [0.0, 0.06975647, 0.99756405, 0.0]"));
+  folder_.write("off.yaml", turned(bytes_of("calib.yaml"), 4));
   EXPECT_NE(verdict("off.yaml").find("too inaccurate for stereo: calibrate again\n"),
             std::string::npos)
       << verdict("off.yaml");
@@ -945,9 +946,7 @@ TEST_F(Command, CalibrationIsRefined) {
     EXPECT_EQ(ends_with("calib.yaml"), 0);
     EXPECT_EQ(ends_with("off.yaml"), 2);
   }
-  folder_.write("far_off.yaml", replaced(bytes_of("calib.yaml"), rows,
-                                         "[0.0, 0.97814760, -0.20791169, 0.0]\n"
-                                         "  - [0.0, 0.20791169, 0.97814760, 0.0]"));
+  folder_.write("far_off.yaml", turned(bytes_of("calib.yaml"), 12));
   EXPECT_NE(verdict("far_off.yaml")
                 .find("does not fit: are the images of one moment, and of these cameras? "
                       "Then calibrate again\n"),
@@ -997,16 +996,45 @@ TEST_F(Command, CalibrationIsRefined) {
   EXPECT_FALSE(fs::exists(folder_ / "no.yaml"));
 }
 
-/// Noise 6 pixels farther to the left in the second camera.
-class ShiftedPair : public Command {
+/// Noise with features.
+class TexturedPair : public Command {
  protected:
-  void SetUp() override {
-    Command::SetUp();
+  /// Writes left.png and right.png: noise that lies `shift` pixels farther to the left in the
+  /// second camera.
+  void write_images(int shift) const {
     cv::Mat noise(96, 110, CV_8UC1);
     cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 255);
     cv::GaussianBlur(noise, noise, {}, 1);
     cv::imwrite(file("left.png"), noise.colRange(0, 96));
-    cv::imwrite(file("right.png"), noise.colRange(6, 102));
+    cv::imwrite(file("right.png"), noise.colRange(shift, shift + 96));
+  }
+  /// What matches the pair, and a sequence of it.
+  std::vector<std::string> matching_commands() const {
+    for (const char* camera : {"cam0", "cam1"}) fs::create_directories(folder_ / camera);
+    fs::copy(folder_ / "left.png", folder_ / "cam0" / "1.png");
+    fs::copy(folder_ / "right.png", folder_ / "cam1" / "1.png");
+    return {"depth " + file("left.png") + " " + file("right.png"),
+            "sequence " + folder_.path().string()};
+  }
+  /// What a command prints, which ends well.
+  std::string output_of(const std::string& command, const std::string& calibration,
+                        const std::string& min_distance) {
+    const Outcome outcome = run(command + " -c " + file(calibration) + " -o " +
+                                file("out" + std::to_string(outputs_++)) +
+                                " --preset fast --device cpu --min-distance " + min_distance);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return outcome.output;
+  }
+
+ private:
+  int outputs_ = 0;
+};
+
+class ShiftedPair : public TexturedPair {
+ protected:
+  void SetUp() override {
+    TexturedPair::SetUp();
+    write_images(6);
   }
   std::string calibration(const std::string& what, const std::string& a,
                           const std::string& b) const {
@@ -1043,31 +1071,40 @@ TEST_F(ShiftedPair, SequencesOfSwappedCamerasGiveAHint) {
 }
 
 TEST_F(ShiftedPair, FeaturesOutOfTheRangeAreReported) {
-  for (const char* camera : {"cam0", "cam1"}) fs::create_directories(folder_ / camera);
-  fs::copy(folder_ / "left.png", folder_ / "cam0" / "1.png");
-  fs::copy(folder_ / "right.png", folder_ / "cam1" / "1.png");
-  const std::string pair = "depth " + file("left.png") + " " + file("right.png");
-  const std::string sequence = "sequence " + folder_.path().string();
-  int number = 0;
-  const auto outcome = [&](const std::string& command, const char* range) {
-    const Outcome run_of =
-        run(command + " -c " + file("calib.yaml") + " -o " + file(std::to_string(number++)) +
-            " --preset fast --device cpu " + range);
-    EXPECT_EQ(run_of.exit_code, 0) << run_of.output;
-    return run_of.output;
-  };
-  for (const std::string& command : {pair, sequence}) {
-    EXPECT_THAT(outcome(command, "--min-distance 0.1 --max-distance 50"),
+  for (const std::string& command : matching_commands()) {
+    EXPECT_THAT(output_of(command, "calib.yaml", "0.1 --max-distance 50"),
                 Not(HasSubstr("features that match lie")));
-    EXPECT_THAT(outcome(command, "--min-distance 0.1 --max-distance 0.2"),
+    EXPECT_THAT(output_of(command, "calib.yaml", "0.1 --max-distance 0.2"),
                 ContainsRegex("% of the features that match lie farther than --max-distance 0.2 m "
                               ".99 % of all within 0.[0-9]+ m., and nothing there can be found; "
                               "give a larger one"));
-    EXPECT_THAT(outcome(command, "--min-distance 2"),
+    EXPECT_THAT(output_of(command, "calib.yaml", "2"),
                 ContainsRegex("% of the features that match lie nearer than --min-distance 2 m "
                               ".99 % of all beyond 0.[0-9]+ m., and nothing there can be found; "
                               "give a smaller one"));
   }
+}
+
+/// Patches are looked for on epipolar curves alone.
+TEST_F(TexturedPair, ErrorsOfTheCalibrationAreReported) {
+  write_images(0);  // as of what is far away
+  alter("right.png", 60);
+  folder_.write("turned.yaml", turned(bytes_of("calib.yaml"), 1));
+  folder_.write("far_off.yaml", turned(bytes_of("calib.yaml"), 30));
+  const std::string off = "lie 0.5[0-9] px off their epipolar curves .median., and would lie 0.0";
+  const std::vector<std::string> commands = matching_commands();
+  for (const std::string& command : commands) {
+    EXPECT_THAT(output_of(command, "calib.yaml", "0.1"), Not(HasSubstr("calibration")));
+    EXPECT_THAT(output_of(command, "turned.yaml", "0.1"),
+                ContainsRegex(off + ".*; mend it by `widestereo calibration refine`"));
+    EXPECT_THAT(output_of(command, "far_off.yaml", "0.1"),
+                HasSubstr("The features of the images do not fit the calibration"));
+  }
+  // One camera in two places, turned as much.
+  folder_.write("poses.txt", "0 0 0 0 0 0 0 1\n1 0.1 0 0 0.0087 0 0 1\n");
+  write_first_camera();
+  EXPECT_THAT(output_of(commands.front(), "mono.yaml", "0.1 --poses " + file("poses.txt")),
+              ContainsRegex(off + ".*; get better poses"));
 }
 
 /// As of one camera on both channels.
