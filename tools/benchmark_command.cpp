@@ -10,6 +10,7 @@
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"
+#include "result_folders.h"
 #include "roofline.h"
 #include "schedule/option_names.h"
 #include "text/formatted.h"
@@ -109,7 +110,7 @@ void replace(ws::DevicePeaks& peaks, const ws::DevicePeaks& given) {
 
 void run_benchmark(BenchmarkArguments a) {
   require_one_device(a);
-  if (!a.output.empty() && a.output == a.plot) {
+  if (!a.output.empty() && !a.plot.empty() && absolute_path(a.output) == absolute_path(a.plot)) {
     throw ws::Error("--output and --plot both name " + a.output + "; give each a file of its own.");
   }
   for (const std::string& file : {a.output, a.plot}) {

@@ -13,6 +13,7 @@
 #include "option_checks.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
+#include "say.h"
 #include "text/formatted.h"
 #include "white_level.h"
 #include "widestereo/epipolar.h"
@@ -132,6 +133,12 @@ bool check(const CheckArguments& arguments) {
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
   const std::string verdict = verdict_of(r, first, second, matches, arguments.poses.given());
+  constexpr double longest_baseline = 5;  // metres, of what is usually mounted
+  const double length = baseline(first, second);
+  if (images.in_metres && !arguments.poses.given() && length > longest_baseline) {
+    say(ws::formatted("The baseline is %.4g m long; calibrations are in metres, is this one?",
+                      length));
+  }
   if (arguments.as_json) {
     // 0: there is none
     const auto distance = [](double value) {
@@ -147,6 +154,7 @@ bool check(const CheckArguments& arguments) {
                                          {"distance_p50", distance(r.typical)},
                                          {"distance_p95", distance(r.farthest)},
                                          {"first_sharper_by_pixels", blur},
+                                         {"baseline", length},
                                          {"verdict", verdict}})
                      .dump(2)
               << "\n";
@@ -159,11 +167,6 @@ bool check(const CheckArguments& arguments) {
       "calibration: %s\n",
       r.matches, r.median_pixels, r.median_degrees, 100 * r.below_1_pixel, 100 * r.below_5_pixels,
       distances_of(r, images.in_metres ? " m" : "").c_str(), verdict.c_str());
-  constexpr double longest_baseline = 5;  // metres, of what is usually mounted
-  const double length = baseline(first, second);
-  if (images.in_metres && !arguments.poses.given() && length > longest_baseline) {
-    std::printf("baseline: %.4g m; calibrations are in metres, is this one?\n", length);
-  }
   if (sharpness) {
     std::printf("sharpness: %s is as sharp as %s blurred by %.2f px; see to the focus\n",
                 (blur > 0 ? second : first).name.c_str(), (blur > 0 ? first : second).name.c_str(),

@@ -25,8 +25,6 @@ std::optional<ws::EpipolarReport> after_refinement(const ws::Rig& rig,
 
 }  // namespace
 
-bool lie_behind(const ws::EpipolarReport& report) { return report.behind > 0.5; }
-
 bool will_do(const ws::EpipolarReport& report) {
   constexpr double usable = 1;  // pixels
   return !lie_behind(report) && report.median_pixels < usable;

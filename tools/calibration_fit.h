@@ -7,10 +7,6 @@
 #include "widestereo/epipolar.h"
 #include "widestereo/rig.h"
 
-/// Then the epipolar error tells nothing: where cameras look the same way, it is as small with one
-/// in the other's place.
-bool lie_behind(const widestereo::EpipolarReport& report);
-
 /// Whether the calibration will do for stereo.
 bool will_do(const widestereo::EpipolarReport& report);
 

@@ -60,8 +60,8 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
   }
   if (!model) {
     // Of what is missing, or neither an image nor a calibration, these say so.
-    ws::read_image(files.front());
-    ws::read_calibration(arguments.rig.calibration);
+    const cv::Size size = ws::read_image(files.front()).size();
+    ws::read_calibration(arguments.rig.calibration, size);
     throw ws::Error(
         "One image is not enough, unless --calibration is a COLMAP model to choose "
         "others from; give two or more.");

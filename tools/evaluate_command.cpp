@@ -70,7 +70,8 @@ int view_in_name(const fs::path& map, const fs::path& set) {
 
 /// Which of the calibration's cameras was the result's view of that number, as for matching they
 /// may have come in another order; none where the map has no record beside it.
-std::optional<int> camera_in_record(const fs::path& map, int view, const fs::path& calibration) {
+std::optional<int> camera_in_record(const fs::path& map, cv::Size size, int view,
+                                    const fs::path& calibration) {
   using Json = nlohmann::ordered_json;
   const Json record = record_in(map.parent_path());
   const Json views = record.is_object() ? record.value("views", Json()) : Json();
@@ -79,7 +80,7 @@ std::optional<int> camera_in_record(const fs::path& map, int view, const fs::pat
       !views[number].is_object()) {
     return std::nullopt;
   }
-  const std::vector<ws::View> cameras = ws::read_calibration(calibration).rig.views;
+  const std::vector<ws::View> cameras = ws::read_calibration(calibration, size).rig.views;
   const auto camera = std::find_if(cameras.begin(), cameras.end(), [&](const ws::View& other) {
     return views[number].value("name", Json()) == Json(other.name);
   });
@@ -87,13 +88,14 @@ std::optional<int> camera_in_record(const fs::path& map, int view, const fs::pat
   return static_cast<int>(camera - cameras.begin());
 }
 
-void choose_views(EvaluateArguments& a) {
+/// `size`: of the map.
+void choose_views(EvaluateArguments& a, cv::Size size) {
   if (a.view_of_map) {
     a.view = *a.view_of_map;
   } else if (!a.set.empty()) {
     const int in_name = view_in_name(a.prediction, a.set);
     const auto in_record = camera_in_record(
-        a.prediction, in_name,
+        a.prediction, size, in_name,
         a.calibration.empty() ? fs::path(a.set) / calibration_of_set : fs::path(a.calibration));
     a.view = in_record.value_or(in_name);
     if (a.view != 0 || in_name != 0) {
@@ -128,7 +130,9 @@ void take_from_set(EvaluateArguments& a) {
 }
 
 void run_evaluate(EvaluateArguments a) {
-  choose_views(a);
+  require_scaled_png("--png-scale", a.png_scale, a.prediction);
+  const cv::Mat prediction = read_map(a.prediction, 1, "a distance map", a.png_scale);
+  choose_views(a, prediction.size());
   if (!a.set.empty()) take_from_set(a);
   if (a.truth.empty() || a.calibration.empty()) {
     throw ws::Error("Give --truth and --calibration, or a folder with both by --set.");
@@ -154,8 +158,6 @@ void run_evaluate(EvaluateArguments a) {
     }
     truth.field_of_view = read_labels(a.field_of_view);
   }
-  require_scaled_png("--png-scale", a.png_scale, a.prediction);
-  const cv::Mat prediction = read_map(a.prediction, 1, "a distance map", a.png_scale);
   require_same_size(prediction, a.prediction, truth.distance, a.truth,
                     "score maps that were matched at that size, without --max-image-size");
   const cv::Mat normals = a.normals.empty() ? cv::Mat() : read_map(a.normals, 3, "a normal map");

@@ -69,6 +69,11 @@ ChosenFrames FrameSettings::choose(const std::string& dataset,
       .all = folders.empty() ? ws::read_sequence(dataset, cameras, skip_incomplete, time_tolerance)
                              : ws::read_sequence(of_cameras, skip_incomplete, time_tolerance),
       .chosen = {}};
+  if (time_tolerance > 0 && std::none_of(frames.all.begin(), frames.all.end(),
+                                         [](const auto& frame) { return frame.nanoseconds; })) {
+    throw ws::Error("--time-tolerance has no effect on " + dataset +
+                    ", whose images have no times; leave it out.");
+  }
   std::vector<std::size_t> complete;
   for (std::size_t i = 0; i < frames.all.size(); ++i) {
     if (ws::is_complete(frames.all[i])) complete.push_back(i);

@@ -67,8 +67,8 @@ bool is_one_group(const PosedImages& images, const ReconstructArguments& argumen
   return images.are_of_one_frame && !arguments.sources && all > 1 && all <= ws::Matcher::most_views;
 }
 
-/// To match with each other; throws Error where no image has another one, or where no point can be
-/// in as many as --min-views asks.
+/// To match with each other, those of a single image last; throws Error where no image has another
+/// one, or where no point can be in as many as --min-views asks.
 std::vector<Images> groups_of(const PosedImages& images, const ReconstructArguments& arguments) {
   const std::size_t all = images.views.size();
   std::vector<Images> groups;
@@ -92,6 +92,8 @@ std::vector<Images> groups_of(const PosedImages& images, const ReconstructArgume
                     " leaves out every point of the " + std::to_string(matched) +
                     " images that are matched; give " + std::to_string(matched) + " at most.");
   }
+  std::stable_partition(groups.begin(), groups.end(),
+                        [](const Images& group) { return !is_alone(group); });
   return groups;
 }
 
@@ -125,11 +127,16 @@ std::vector<Images> within_range(const std::vector<Images>& groups, const PosedI
   return within;
 }
 
-/// Of each group: its images' points say how far the scene reaches where the settings do not.
+/// Of each group: its images' points say how far the scene reaches where the settings do not. What
+/// is matched with nothing needs none.
 std::vector<ws::Options> options_of(const std::vector<Images>& groups, const PosedImages& images,
                                     const ReconstructArguments& arguments) {
   std::vector<ws::Options> options;
   for (const Images& group : groups) {
+    if (is_alone(group)) {
+      options.emplace_back();
+      continue;
+    }
     const ws::CalibratedImages seen{
         .rig = {}, .distances = images.distances(group), .in_metres = images.in_metres};
     options.push_back(

@@ -235,10 +235,13 @@ void ResultFolders::write_record_now_and_then() {
   if (!obsolete_.empty() || Clock::now() - written_ >= least_share * writing_) write_record();
 }
 
+void ResultFolders::finish() {
+  if (!is_written_) write_record();
+}
+
 ResultFolders::~ResultFolders() {
-  if (is_written_) return;
   try {
-    write_record();
+    finish();
   } catch (const std::exception&) {
     // What it lacks is made again.
   }

@@ -75,7 +75,9 @@ class ResultFolders {
   /// Notes something of the whole run in the record.
   void note(const std::string& key, Json value);
 
-  /// Writes what has not been yet.
+  /// Writes the record where it lags behind; throws Error where it cannot be written.
+  void finish();
+  /// Likewise after an error, but says nothing where it cannot be written.
   ~ResultFolders();
   ResultFolders(const ResultFolders&) = delete;
   ResultFolders& operator=(const ResultFolders&) = delete;

@@ -213,6 +213,7 @@ class SequenceRun {
     ws::Matcher matcher(device_, selection_.rig, options_);
     if (finished > 0) take_up(finished - 1);
     for (std::size_t i = finished; i < selection_.frames.size(); ++i) match(matcher, i);
+    folder_.finish();
   }
 
   const SequenceFolder& folder() const { return folder_; }

@@ -33,6 +33,9 @@ class SequenceFolder {
   void add(const std::string& name, const std::vector<widestereo::ViewResult>& views,
            const std::function<Json(const std::filesystem::path&)>& write);
 
+  /// As of ResultFolders.
+  void finish() { results_.finish(); }
+
   /// What the next frame starts from: hypotheses and reasons of a frame's views, empty where its
   /// files are not there or do not fit.
   std::vector<widestereo::ViewResult> planes(const std::string& name,

@@ -63,8 +63,8 @@ void write_basalt(const std::filesystem::path& path, const Rig& rig);
 /// An OpenCV FileStorage, for a file that errors name: JSON or XML by its extension, else YAML; K,
 /// D (xi) of one camera, or K1, D1 (xi1), K2, D2 (xi2), R and T as of cv::fisheye, cv::omnidir or
 /// cv::stereoCalibrate, and the extra key max_theta_deg where the field of view is limited. Throws
-/// Error for a rig that validate() refuses, that has three cameras or an IMU, or cameras of two
-/// sizes or kinds, and where OpenCV lacks a camera's model.
+/// Error for a rig that validate() refuses, that has three cameras, an IMU or its time offset, or
+/// cameras of two sizes or kinds, and where OpenCV lacks a camera's model.
 std::string opencv_text(const std::filesystem::path& path, const Rig& rig);
 /// Writes it. Throws Error where the file cannot be written, too.
 void write_opencv(const std::filesystem::path& path, const Rig& rig);

@@ -23,8 +23,8 @@ struct EpipolarReport {
   double median_degrees = 0;  ///< angle of the second ray to the epipolar plane
   double below_1_pixel = 0;   ///< share of matches
   double below_5_pixels = 0;  ///< share of matches
-  /// Share of matches whose point, at 0.3 degrees of parallax or more, lies behind the first
-  /// camera.
+  /// Share of matches whose point lies behind the first camera, at 0.3 degrees of parallax or more,
+  /// or more than 2 pixels along the curve from where the second image has what is infinitely far.
   double behind = 0;
   /// Percentiles 5, 50, 95 of the distance (metres) from the first camera, over matches below 5
   /// pixels with at least 0.3 degrees of parallax; zeros without any. They suggest a distance
@@ -34,6 +34,10 @@ struct EpipolarReport {
 
 /// SIFT features matched mutually with a ratio test; both images 8 or 16 bit. Throws Error.
 std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& second);
+
+/// Whether most of the points lie behind the cameras. Then the epipolar error tells nothing: where
+/// cameras look the same way, it is as small with one in the other's place.
+bool lie_behind(const EpipolarReport& report);
 
 /// Scores matches between two calibrated views, those on masked pixels and at the epipole left out.
 /// Throws Error when there are fewer than 8 or the views share a centre.

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -192,13 +194,26 @@ long long time_offset_form(const Rig& rig, const std::filesystem::path& path) {
   return std::llround(offset * nanoseconds_per_second);
 }
 
+/// Throws Error where a key is there twice, of which parsers take the last one.
+Json parsed(const Document& document) {
+  std::vector<std::set<std::string>> keys;  // of the objects that are open
+  return Json::parse(document.text, [&](int, Json::parse_event_t event, Json& value) {
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second) {
+      document.fail("The key " + value.get<std::string>() + " is there twice; leave one.");
+    }
+    return true;
+  });
+}
+
 }  // namespace
 
 bool has_basalt_form(const Camera& camera) { return form_of(camera).has_value(); }
 
 Rig read_basalt(const Document& document) {
   try {
-    const Json root = Json::parse(document.text);
+    const Json root = parsed(document);
     if (!root.contains("value0")) {
       document.fail(
           "It has no \"value0\" as a Basalt calibration has; give one, or one of the other "

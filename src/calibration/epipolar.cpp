@@ -23,6 +23,7 @@ constexpr double ratio = 0.8;
 constexpr std::size_t fewest_matches = 8;
 constexpr double at_epipole = 1e-6;     // radians
 constexpr double least_parallax = 0.3;  // degrees, to tell a distance
+constexpr double out_of_range = 2;      // pixels beyond an end of a range, or beyond infinity
 /// SIFT looks for features in an image of twice the size, and takes pixel 2 x of it for pixel x,
 /// whose middle lies a quarter of a pixel farther.
 constexpr float sift_offset = 0.25f;
@@ -69,6 +70,7 @@ struct TriangulatedMatch {
   double degrees = 0;              ///< of the second ray to the epipolar plane
   double parallax = 0;             ///< degrees
   std::optional<double> distance;  ///< from the first camera; of enough parallax to tell
+  bool is_behind = false;          ///< the first camera, as rays diverge by more than noise
   Eigen::Vector3d first_ray;
 };
 
@@ -99,11 +101,16 @@ class EpipolarGeometry {
         .degrees = std::abs(std::asin(std::clamp(offset, -1.0, 1.0))) * degrees_per_radian,
         .parallax = degrees_between(rotated, ray_second),
         .distance = std::nullopt,
+        .is_behind = false,
         .first_ray = ray_first};
-    if (found.parallax >= least_parallax) {
-      const Eigen::Vector3d other = motion_.linear().transpose() * ray_second;
-      found.distance = triangulated_distance(ray_first, other, motion_.inverse().translation());
-    }
+    const Eigen::Vector3d other = motion_.linear().transpose() * ray_second;
+    const double distance =
+        triangulated_distance(ray_first, other, motion_.inverse().translation());
+    if (found.parallax >= least_parallax) found.distance = distance;
+    Eigen::Vector2d infinite;
+    found.is_behind =
+        distance < 0 && (found.distance || (rays_.second_camera().project(rotated, infinite) &&
+                                            (infinite - foot).norm() > out_of_range));
     return found;
   }
 
@@ -141,6 +148,8 @@ std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& seco
   return matches;
 }
 
+bool lie_behind(const EpipolarReport& report) { return report.behind > 0.5; }
+
 EpipolarReport check_epipolar(const View& first, const View& second,
                               const std::vector<PixelMatch>& matches) {
   const EpipolarGeometry geometry(first, second, "The epipolar check");
@@ -153,8 +162,8 @@ EpipolarReport check_epipolar(const View& first, const View& second,
     if (!found) continue;
     pixels.push_back(found->pixels);
     angles.push_back(found->degrees);
+    behind += found->is_behind;
     if (!found->distance) continue;
-    if (*found->distance < 0) ++behind;
     if (*found->distance > 0 && found->pixels < 5) distances.push_back(*found->distance);
   }
   if (pixels.size() < fewest_matches) {
@@ -187,17 +196,15 @@ RangeReport check_range(const View& first, const View& second,
     throw Error("A range of distances from " + std::to_string(min_distance) + " to " +
                 std::to_string(max_distance) + " holds none; give 0 < min < max.");
   }
-  constexpr double on_curve = 1;      // pixels
-  constexpr double out_of_range = 2;  // pixels
+  constexpr double on_curve = 1;  // pixels
   const EpipolarGeometry geometry(first, second, "The check of the range");
   RangeReport report;
   std::vector<double> distances;
   for (const PixelMatch& match : matches) {
     const auto found = geometry.find(match);
     if (!found || found->pixels > on_curve) continue;
-    const bool is_behind = found->distance && *found->distance < 0;
     ++report.matches;
-    if (is_behind) continue;
+    if (found->is_behind) continue;
     if (found->distance) distances.push_back(*found->distance);
     const auto displaced_from = [&](double distance) {
       Eigen::Vector2d pixel;

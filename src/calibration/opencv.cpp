@@ -98,7 +98,7 @@ class Storage {
   cv::Mat matrix(Keys keys) const {
     for (const char* const named : keys) {
       std::string key = named;
-      if (begins_with_0_ && (key.back() == '1' || key.back() == '2')) --key.back();
+      if (begins_with_0_ && key.back() >= '1' && key.back() <= '3') --key.back();
       const cv::FileNode node = node_of(key);
       cv::Mat value = numbers(node);
       if (node.isMap()) {
@@ -225,6 +225,7 @@ constexpr Keys first_matrix = {"K1",
 constexpr Keys second_matrix = {
     "K2",           "M2", "cameraMatrix2", "camera_matrix_2", "K_right", "camera_matrix_right",
     "cameraMatrixR"};
+constexpr Keys third_matrix = {"K3", "M3", "cameraMatrix3", "camera_matrix_3"};
 constexpr Keys first_distortion = {"D1",
                                    "distCoeffs1",
                                    "dist_coeffs_1",
@@ -449,6 +450,11 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
                     "; `calibration convert --scale` makes a calibration for reduced images.");
     }
     require_known_xi(document, storage);
+    if (!storage.matrix(third_matrix).empty()) {
+      document.fail(
+          "It has three cameras, but R and T are those of two; give two, or a rig of more as a "
+          "Kalibr camchain.");
+    }
     Rig rig;
     rig.views.resize(2);
     rig.views[0].name = "cam0";

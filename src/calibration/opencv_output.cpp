@@ -72,6 +72,13 @@ void require_form(const Rig& rig, const std::vector<OpenCvForm>& forms,
          "OpenCV's calibrations cannot say where the IMU is; choose Kalibr's or Basalt's "
          "format, or leave the IMU out of what is read.");
   }
+  for (const View& view : rig.views) {
+    if (view.imu_time_offset == 0) continue;
+    fail(
+        path,
+        "OpenCV's calibrations cannot say how the IMU's clock differs; choose Kalibr's or Basalt's "
+        "format, or leave the time offset out of what is read.");
+  }
   const Camera& first = rig.views.front().camera;
   const Camera& last = rig.views.back().camera;
   if (first.width != last.width || first.height != last.height) {

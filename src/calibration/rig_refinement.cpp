@@ -156,6 +156,7 @@ class Refinement {
       const Eigen::Vector3d between =
           second.world_from_camera.translation() - first.world_from_camera.translation();
       std::vector<double> distances;  // from the nearer camera
+      std::vector<double> seen;       // those of matches with rays
       for (const PixelMatch& match : pair.matches) {
         SeenRay a;
         SeenRay b;
@@ -164,12 +165,13 @@ class Refinement {
             !see(second, cameras[pair.second], match.second, b)) {
           continue;
         }
-        if (a.direction.cross(b.direction).norm() <= least_parallax) continue;
-        distance = std::min(triangulated_distance(a.direction, b.direction, between),
-                            triangulated_distance(b.direction, a.direction, -between));
+        if (a.direction.cross(b.direction).norm() > least_parallax) {
+          distance = std::min(triangulated_distance(a.direction, b.direction, between),
+                              triangulated_distance(b.direction, a.direction, -between));
+        }
+        seen.push_back(distance);
       }
-      std::vector<double> sorted = distances;
-      const double least = least_share * percentile(sorted, 0.5);
+      const double least = least_share * percentile(seen, 0.5);
       counts_[i].clear();
       for (const double distance : distances) counts_[i].push_back(distance > std::max(least, 0.0));
     }
@@ -353,7 +355,7 @@ std::string fault_of(const EpipolarReport& after, const View& first, const View&
   if (!(after.below_5_pixels > 0.5)) {
     return "The features matched between " + pair + " contradict each other";
   }
-  if (after.behind > 0.5) {
+  if (lie_behind(after)) {
     return "Most features matched between " + pair + " lie behind the cameras";
   }
   return "";

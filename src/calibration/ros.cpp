@@ -34,8 +34,8 @@ void set_lens(Camera& camera, const Document& document, const YamlCamera& keys) 
 }
 
 /// Images may be a part of what was calibrated, or reduced.
-void require_whole_images(const Document& document, const YamlCamera& keys,
-                          const YAML::Node& root) {
+void require_whole_images(const Document& document, const YamlCamera& keys, const YAML::Node& root,
+                          const Camera& camera) {
   for (const char* key : {"binning_x", "binning_y"}) {
     if (keys.has(key) && keys.number(key) > 1) {
       document.fail(std::string("Its images are binned (") + key +
@@ -44,8 +44,11 @@ void require_whole_images(const Document& document, const YamlCamera& keys,
   }
   if (!keys.has("roi")) return;
   const YamlCamera roi(document, "roi", root["roi"]);
-  for (const char* key : {"x_offset", "y_offset", "width", "height"}) {
-    if (!roi.has(key) || roi.number(key) == 0) continue;
+  // All of the image may be given as its size, too.
+  const std::pair<const char*, int> whole[] = {
+      {"x_offset", 0}, {"y_offset", 0}, {"width", camera.width}, {"height", camera.height}};
+  for (const auto& [key, size] : whole) {
+    if (!roi.has(key) || roi.number(key) == 0 || roi.number(key) == size) continue;
     document.fail(std::string("Its images are a part of what was calibrated (roi: ") + key +
                   "); move the centre in K, set width and height to theirs, and roi to 0.");
   }
@@ -64,7 +67,7 @@ RectifiedView read_view(const Document& document, const std::string& name, const
   set_lens(camera, document, keys);
   camera.width = keys.side(named(keys, {"image_width", "width"}));
   camera.height = keys.side(named(keys, {"image_height", "height"}));
-  require_whole_images(document, keys, root);
+  require_whole_images(document, keys, root, camera);
   const char* matrix = named(keys, {"camera_matrix", "K", "k"});
   const std::vector<double> k = keys.numbers(matrix, 9);
   set_matrix(camera, document, matrix, Eigen::Map<const Rows3x3>(k.data()));

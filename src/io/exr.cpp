@@ -110,7 +110,7 @@ cv::Mat within(const cv::Mat& data, cv::Point origin, const Imath::Box2i& image)
   if (of_data == of_image) return data;
   cv::Mat map = cv::Mat::zeros(of_image.size(), data.type());
   const cv::Rect common = of_data & of_image;
-  data(common - origin).copyTo(map(common - of_image.tl()));
+  if (!common.empty()) data(common - origin).copyTo(map(common - of_image.tl()));
   return map;
 }
 
@@ -139,6 +139,8 @@ cv::Mat read_exr(const std::filesystem::path& path, const std::vector<uchar>& by
     throw;
   } catch (const std::bad_alloc&) {
     throw;
+  } catch (const cv::Exception&) {
+    throw;  // of too little memory
   } catch (const std::exception& error) {
     throw Error(path.string() + " is truncated, damaged or no OpenEXR image (" + error.what() +
                 "); copy it again.");

@@ -22,8 +22,9 @@ std::string_view first_part(std::string_view text) {
   return text.substr(0, static_cast<std::size_t>(end - text.begin()));
 }
 
+/// Without the zeros before it.
 std::string_view significant(std::string_view number) {
-  return number.substr(std::min(number.find_first_not_of('0'), number.size()));
+  return number.substr(std::min(number.find_first_not_of('0'), number.size() - 1));
 }
 
 /// Of any length.
@@ -75,14 +76,21 @@ CameraImages by_numbers(const CameraImages& images) {
   const std::vector<std::size_t> differing = differing_numbers(names);
   CameraImages renamed{.folder = images.folder, .of_frames = {}, .listed = images.listed};
   if (differing.empty()) return renamed;
-  std::size_t number = 0;
-  for (const auto& image : images.of_frames) {
-    std::string key;
-    for (const std::size_t i : differing) {
-      key += (key.empty() ? "" : "_") + names[number].numbers[i];
+  // Cameras may write 7 and 07; where one writes both, they are two.
+  for (const bool with_zeros : {false, true}) {
+    renamed.of_frames.clear();
+    std::size_t number = 0;
+    for (const auto& image : images.of_frames) {
+      std::string key;
+      for (const std::size_t i : differing) {
+        const std::string& digits = names[number].numbers[i];
+        key += (key.empty() ? "" : "_");
+        key += with_zeros ? std::string_view(digits) : significant(digits);
+      }
+      renamed.of_frames.emplace(key, image.second);
+      ++number;
     }
-    renamed.of_frames.emplace(key, image.second);
-    ++number;
+    if (renamed.of_frames.size() == images.of_frames.size()) break;
   }
   return renamed;
 }

@@ -151,7 +151,12 @@ void require_one_pose_a_time(const std::vector<StampedPose>& sorted, const std::
 
 bool is_earlier(const StampedPose& a, const StampedPose& b) { return a.seconds < b.seconds; }
 
-double apart(const StampedPose& pose, double seconds) { return std::abs(pose.seconds - seconds); }
+/// Nothing where they differ by the rounding of seconds since 1970 alone.
+double apart(const StampedPose& pose, double seconds) {
+  constexpr double rounding = 1e-6;
+  const double apart = std::abs(pose.seconds - seconds);
+  return apart > rounding ? apart : 0;
+}
 
 double seconds_of(const SequenceFrame& frame) {
   return static_cast<double>(*frame.nanoseconds) * 1e-9;

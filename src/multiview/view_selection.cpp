@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "geometry/angle.h"
+#include "geometry/pixel_angle.h"
 #include "geometry/validation.h"
 
 namespace widestereo {
@@ -66,16 +67,14 @@ void thin_out(std::vector<Partner>& partners, std::size_t owner) {
 std::vector<Eigen::Vector3d> assumed_rays(const View& view, const PreparedCamera& camera, int side,
                                           double nearest, double farthest) {
   std::vector<Eigen::Vector3d> rays;
-  for (int i = 0; i < side * side; ++i) {
-    const Eigen::Vector2d pixel((i % side + 0.5) * view.camera.width / side - 0.5,
-                                (i / side + 0.5) * view.camera.height / side - 0.5);
+  for_each_of_grid(view.camera, side, [&](const Eigen::Vector2d& pixel) {
     Eigen::Vector3d ray;
-    if (!camera.unproject(pixel, ray) || is_masked(view, pixel)) continue;
+    if (!camera.unproject(pixel, ray) || is_masked(view, pixel)) return;
     for (int k = 0; k < distances; ++k) {
       const double distance = nearest * std::pow(farthest / nearest, (k + 0.5) / distances);
       rays.push_back(view.world_from_camera.linear() * (distance * ray));
     }
-  }
+  });
   return rays;
 }
 

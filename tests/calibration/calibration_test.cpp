@@ -290,6 +290,14 @@ TEST(Basalt, MayBeginWithAByteOrderMark) {
   EXPECT_EQ(read_calibration(path).format, CalibrationFormat::basalt);
 }
 
+TEST(Basalt, HasEachKeyOnce) {
+  const TemporaryFolder folder;
+  const std::string twice = replaced(basalt_text, "\"fx\":", "\"fx\": 90, \"fx\":");
+  EXPECT_NE(
+      error_of(folder.write("calib.json", twice)).find("The key fx is there twice; leave one"),
+      std::string::npos);
+}
+
 TEST(Basalt, ReadsWhereTheImuIs) {
   const TemporaryFolder folder;
   EXPECT_FALSE(
@@ -403,6 +411,13 @@ TEST(OpenCv, MayCountCamerasFromZero) {
   const Rig expected = read_calibration(folder.write("stereo.yml", opencv_text)).rig;
   ASSERT_EQ(rig.views.size(), 2u);
   for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(rig.views[i].camera, expected.views[i].camera);
+  // A third one would be dropped without a word.
+  const std::string matrix = "\nK2: [300., 0., 640., 0., 300., 480., 0., 0., 1.]\n";
+  const std::string three = "It has three cameras, but R and T are those of two";
+  EXPECT_NE(error_of(folder.write("three.yml", text + matrix)).find(three), std::string::npos);
+  EXPECT_NE(
+      error_of(folder.write("three.yml", opencv_text + replaced(matrix, "K2", "K3"))).find(three),
+      std::string::npos);
 }
 
 /// As programs in Python write its matrices by json and yaml.
@@ -947,6 +962,9 @@ TEST(Writing, OpenCvFilesAreThoseOfItsCalibrations) {
   bad = rig;
   bad.world_from_imu = camera_beside_imu();
   expect(bad, "cannot say where the IMU is");
+  bad = rig;
+  bad.views[1].imu_time_offset = 0.05;
+  expect(bad, "cannot say how the IMU's clock differs");
   bad = rig;
   bad.views[1].camera.width = 640;
   expect(bad, "cameras of one image size");

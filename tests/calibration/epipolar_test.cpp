@@ -154,6 +154,28 @@ TEST(Epipolar, FarMatchesTellNoDistance) {
   EXPECT_EQ(report.farthest, 0);
 }
 
+/// As of swapped cameras: some pixels are much where a lens is long, however small the angle.
+TEST(Epipolar, SmallAnglesOfLongLensesTellWhatLiesBehind) {
+  Rig rig = rig_with_rotation_error(0);
+  for (View& view : rig.views) {
+    view.camera.model = CameraModel::pinhole;
+    view.camera.fx = view.camera.fy = 2000;
+    view.camera.xi = view.camera.alpha = 0;
+  }
+  for (const double shift : {1.5, 3.0}) {  // 0.04 and 0.09 degrees
+    std::vector<PixelMatch> matches;
+    for (int i = 0; i < 400; ++i) {
+      const Eigen::Vector2d first(20 + 20 * (i % 20), 20 + 20 * (i / 20));
+      matches.push_back({first, first + Eigen::Vector2d(shift, 0)});
+    }
+    const EpipolarReport report = check_epipolar(rig.views[0], rig.views[1], matches);
+    EXPECT_EQ(report.matches, 400);
+    EXPECT_EQ(report.behind, shift > 2 ? 1 : 0);
+    EXPECT_EQ(lie_behind(report), shift > 2);
+    EXPECT_EQ(check_range(rig.views[0], rig.views[1], matches, 1, 200).farther, 0);
+  }
+}
+
 TEST(Epipolar, FalseMatchesTellNoDistance) {
   const Rig rig = rig_with_rotation_error(0);
   const std::vector<PixelMatch> right = exact_matches(rig);

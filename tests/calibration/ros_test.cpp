@@ -166,6 +166,12 @@ TEST(Ros, WhatIsWrongIsOneSentence) {
               HasSubstr("Its images are binned (binning_x)"));
   EXPECT_THAT(error_of_text(replaced(message_of(1, false), "y_offset: 0", "y_offset: 16")),
               HasSubstr("a part of what was calibrated (roi: y_offset)"));
+  const auto with_size = [](const char* height) {
+    return replaced(message_of(1, false), "height: 0\n  width: 0",
+                    std::string("height: ") + height + "\n  width: 848");
+  };
+  EXPECT_EQ(error_of_text(with_size("800")), "") << "all of the image";
+  EXPECT_THAT(error_of_text(with_size("400")), HasSubstr("was calibrated (roi: height)"));
   EXPECT_GT(test::times_refused(file_of(1), error_of_text), 30);
 
   const TemporaryFolder other;

@@ -456,6 +456,20 @@ TEST_F(ReconstructCommand, OneEndOfTheRangeWillDo) {
   EXPECT_FALSE(record()["settings"]["options"].contains("max_distance"));
 }
 
+/// An image that is matched with nothing may see what is nearer than the end given.
+TEST_F(ReconstructCommand, OneEndOfTheRangeIsOfWhatIsMatched) {
+  std::string observations, points;
+  for (int i = 100; i < 140; ++i) {
+    observations += "1 1 " + std::to_string(i) + " ";
+    points += std::to_string(i) + " -5 0 2 0 0 0 1 3 0\n";
+  }
+  replace_in_model("model/images.txt", "away.png\n", "away.png\n" + observations);
+  folder_.write("model/points3D.txt", bytes_of("model/points3D.txt") + points);
+  const Outcome outcome = run(reconstruct() + "--min-distance 3");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(record()["images"].size(), 2U);
+}
+
 /// Two pairs, the second one a kilometre away and ten times as far from what it sees.
 class ReconstructTwoPairs : public ReconstructCommand {
  protected:

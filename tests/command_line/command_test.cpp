@@ -1085,6 +1085,23 @@ TEST_F(ShiftedPair, FeaturesOutOfTheRangeAreReported) {
   }
 }
 
+TEST_F(TexturedPair, BaselinesOfOtherUnitsAreDoubted) {
+  write_images(0);
+  alter("right.png", 60);
+  folder_.write("millimetres.yaml", replaced(bytes_of("calib.yaml"), "-0.1]", "-100]"));
+  for (const char* json : {"", " --json"}) {
+    const auto output_with = [&](const char* calibration) {
+      return run("calibration check " + file("left.png") + " " + file("right.png") + " -c " +
+                 file(calibration) + json)
+          .output;
+    };
+    const std::string doubt =
+        "The baseline is 100 m long; calibrations are in metres, is this one?";
+    EXPECT_THAT(output_with("millimetres.yaml"), HasSubstr(doubt));
+    EXPECT_THAT(output_with("calib.yaml"), Not(HasSubstr("metres")));
+  }
+}
+
 /// Patches are looked for on epipolar curves alone.
 TEST_F(TexturedPair, ErrorsOfTheCalibrationAreReported) {
   write_images(0);  // as of what is far away

@@ -293,6 +293,13 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
   EXPECT_EQ(run("evaluate " + file("distance0.tiff") + " --view 0 --set " + file("set"))
                 .output.find("is scored"),
             std::string::npos);
+  // As OpenCV's samples write them, without a size.
+  folder_.write("opencv.yml",
+                "K1: [30, 0, 47.5, 0, 30, 47.5, 0, 0, 1]\nD1: [0, 0, 0, 0]\n"
+                "K2: [30, 0, 47.5, 0, 30, 47.5, 0, 0, 1]\nD2: [0, 0, 0, 0]\nfisheye: 1\n"
+                "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]\n");
+  says(file("distance0.tiff") + " -c " + file("opencv.yml"),
+       "is scored as of view 1, by the record beside it");
   for (const char* record : {R"({"views": [{"name": "left"}, {"name": 7}]})", "[]", "{"}) {
     folder_.write("result.json", record);
     says(file("distance1.tiff"), "is scored as of view 1, by its name");

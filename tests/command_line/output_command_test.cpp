@@ -160,7 +160,7 @@ TEST_F(Output, PicturesDoNotReplaceWhatIsRead) {
                      " --picture ",
                  "poses.png");
   expect_error(
-      "benchmark --devices cpu --sizes 64 -o " + file("b.svg") + " --plot " + file("b.svg"),
+      "benchmark --devices cpu --sizes 64 -o " + file("b.svg") + " --plot " + file("./b.svg"),
       "--output and --plot both name");
   for (const char* output : {"distance.tiff", "left.png"}) {
     expect_refused("evaluate " + file("distance.tiff") + calibration + " --truth " +
@@ -327,7 +327,8 @@ TEST_F(Output, NothingToScoreIsAnError) {
 
 TEST_F(Output, WhatASetLacksIsNamed) {
   const std::string evaluate =
-      "evaluate " + file("left.png") + " --set " + folder_.path().string() + " --view 2";
+      "evaluate " + file("map.tiff") + " --set " + folder_.path().string() + " --view 2";
+  cv::imwrite(file("map.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
   expect_error(evaluate, "has no depth2.tiff; give --truth");
   cv::imwrite(file("depth2.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
   fs::rename(file("calib.yaml"), file("other.yaml"));

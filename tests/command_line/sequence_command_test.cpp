@@ -61,6 +61,10 @@ class SequenceCommand : public Command {
   }
 };
 
+TEST_F(SequenceCommand, ToleranceOfTimesNeedsTimes) {
+  expect_error(sequence() + "--time-tolerance 0.01", "--time-tolerance has no effect on ");
+}
+
 TEST_F(SequenceCommand, BlursTheSharperCameraOfAllFrames) {
   for (int k = 0; k < 3; ++k) {
     const std::string name = "00" + std::to_string(k);

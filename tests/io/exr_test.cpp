@@ -97,6 +97,7 @@ TEST(Exr, HoldsAPartOfTheImage) {
   four.copyTo(whole(cv::Rect(3, 1, 2, 2)));
   EXPECT_TRUE(same_bits(read({{0, 0}, {5, 3}}), whole));
   EXPECT_TRUE(same_bits(read({{4, 1}, {6, 1}}), cv::Mat_<float>({1, 3}, {2.25f, 0.0f, 0.0f})));
+  EXPECT_TRUE(same_bits(read({{0, 5}, {2, 6}}), cv::Mat_<float>(2, 3, 0.0f))) << "nothing";
   EXPECT_NE(error_of([&] {
               read({{0, 0}, {1 << 20, 1 << 20}});
             }).find("too many pixels"),

@@ -192,6 +192,22 @@ TEST_F(Sequences, NumbersInNamesTellFramesWhereNamesDiffer) {
   EXPECT_EQ(read_sequence(folder_.path(), {3, 4})[1].nanoseconds, 1'500'000'001'250'000'000);
 }
 
+TEST_F(Sequences, NumbersAreEqualHoweverManyZerosTheyBeginWith) {
+  for (const char* number : {"0", "8", "9", "10"}) add("cam0/left_" + std::string(number) + ".png");
+  for (const char* number : {"00", "08", "09", "10"}) {
+    add("cam1/right_" + std::string(number) + ".png");
+  }
+  const auto frames = read_sequence(folder_.path(), {0, 1});
+  EXPECT_EQ(names(frames), (std::vector<std::string>{"left_0", "left_8", "left_9", "left_10"}));
+  EXPECT_EQ(frames[1].images[1], folder_ / "cam1/right_08.png");
+  // Of one camera they are two.
+  for (const char* number : {"7", "07"}) {
+    add("cam2/left_" + std::string(number) + ".png");
+    add("cam3/right_" + std::string(number) + ".png");
+  }
+  EXPECT_EQ(read_sequence(folder_.path(), {2, 3}).size(), 2u);
+}
+
 /// As of two drivers that do not know of each other.
 TEST_F(Sequences, ImagesNearInTimeMakeAFrameIfAskedFor) {
   add("mav0/cam0/data.csv", "1000000,a.png\n2000000,b.png\n3000000,c.png\n");
@@ -540,6 +556,20 @@ TEST_F(Trajectories, BelongToFramesByTimeOrOrder) {
   EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0.01, "p").size(), 1u) << "it is not chosen";
   EXPECT_THAT(error_of([&] { poses_of_frames(frames, {0}, {}, 0.01, "p"); }),
               HasSubstr("no poses in p"));
+}
+
+TEST_F(Trajectories, EqualTimesAreEqualWithoutTolerance) {
+  std::vector<SequenceFrame> frames(1);
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const std::int64_t fraction = 763'555'584 + 7'654'321 * i;
+    frames[0].nanoseconds = 1'403'636'579'000'000'000 + fraction;
+    const std::vector<StampedPose> trajectory = {
+        {.seconds = std::stod("1403636579." + std::to_string(fraction)),
+         .world_from_body = Eigen::Isometry3d::Identity()}};
+    EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0, "p").size(), 1u);
+    frames[0].nanoseconds = *frames[0].nanoseconds + 10'000;
+    EXPECT_THROW(poses_of_frames(frames, {0}, trajectory, 0, "p"), Error);
+  }
 }
 
 /// A body on a helix, whose camera takes images between its poses.
