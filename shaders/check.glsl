@@ -56,14 +56,21 @@ FN float turn_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   return length(across) / sqrt(distance2);
 }
 
-// Source pixels that the point moves per unit of inverse distance, in the source where it is fastest; where that leaves
-// all fields of view, pixels of the reference. Zero at an epipole.
+// Source pixels that the point moves per unit of inverse distance, in the source where it is fastest of those in which it
+// lands, or of all where it lands in none; where that leaves all fields of view, pixels of the reference. Zero at an
+// epipole. Far beyond its image a camera's model may tell any speed.
 FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
   float speed = 0.0f;
+  float speed_of_others = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) {
-    speed = max(speed, length(source_velocity(CONTEXT source_at(CONTEXT i), ray, w)));
+    int source = source_at(CONTEXT i);
+    float of_source = length(source_velocity(CONTEXT source, ray, w));
+    bool sees = SOURCE_COUNT == 1 || is_unmasked_in_source(CONTEXT source, ray, w);
+    speed = max(speed, sees ? of_source : 0.0f);
+    speed_of_others = max(speed_of_others, of_source);
   }
   if (speed > 0.0f) return speed;
+  if (speed_of_others > 0.0f) return speed_of_others;
   float turn = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) turn = max(turn, turn_in_source(CONTEXT source_at(CONTEXT i), ray, w));
   float angle = length(step_of_ray(CONTEXT pixel, ray, ivec2(1, 0)));
@@ -191,7 +198,8 @@ FN float confidence_of(Indications i) {
 FN float intensity_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
   vec2 position;
   if (!position_in_source(CONTEXT source, ray, w, position)) return MASKED_INTENSITY;
-  return sample_image(CONTEXT source, PARAMETERS.cameras[source].size, texel_at(CONTEXT position));
+  ivec4 size = PARAMETERS.cameras[source].size;
+  return sample_image(CONTEXT source, size, texel_at(CONTEXT size, position));
 }
 
 // A pixel's plane beside those of the sources and of the surroundings.

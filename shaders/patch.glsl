@@ -5,6 +5,11 @@
 #define NO_INFORMATION_COST 1.0f
 // A coordinate for sample_image() beyond every image's apron.
 #define OUTSIDE_TEXEL -1e6f
+// Positions are drawn to the middle of the image, by a ten-thousandth of a pixel in 500: rounding would put every other
+// one of those that lie on its first or last pixels, as of rectified cameras, beyond them, where nothing is seen. What is
+// left of the distance from the middle, and half of what is not.
+#define DRAWN 0.9999996f
+#define HALF_UNDRAWN 2e-7f
 
 FN bool in_image(ivec4 size, ivec2 pixel) {
   return pixel.x >= 0 && pixel.y >= 0 && pixel.x < size.x && pixel.y < size.y;
@@ -36,12 +41,13 @@ FN bool is_usable(CONTEXT_ARGUMENT ivec2 pixel, vec4 ray) {
   return ray.w != 0.0f && intensity_at(CONTEXT REFERENCE, pixel) >= 0.0f;
 }
 
-// A pixel in the coordinates of sample_image().
+// A pixel in the coordinates of sample_image(); texture units round positions to more than they are drawn.
 FN vec2 texel_scale(CONTEXT_ARGUMENT_ONLY) {
   float texels = float(TEXELS_PER_PIXEL);
 #ifdef HAS_DEVICE_FILTER
   if (FILTER == FILTER_DEVICE) return texels * filtered_texel_unit(CONTEXT_ONLY);
 #endif
+  texels = DRAWN * texels;
   return vec2(texels, texels);
 }
 
@@ -50,19 +56,20 @@ FN vec2 to_texels(vec2 scale, vec2 displacement) {
   return vec2(scale.x * displacement.x, scale.y * displacement.y);
 }
 
-// And where a position (pixels) lies.
-FN vec2 texel_at(CONTEXT_ARGUMENT vec2 position) {
+// And where a position (pixels) lies in an image of this size.
+FN vec2 texel_at(CONTEXT_ARGUMENT ivec4 size, vec2 position) {
   vec2 texel = to_texels(texel_scale(CONTEXT_ONLY), position);
 #ifdef HAS_DEVICE_FILTER
   if (FILTER == FILTER_DEVICE) return texel + (float(TEXEL_APRON) + 0.5f) * filtered_texel_unit(CONTEXT_ONLY);
 #endif
-  return texel;
+  return texel + vec2(HALF_UNDRAWN * float(TEXELS_PER_PIXEL * (size.x - 1)),
+                      HALF_UNDRAWN * float(TEXELS_PER_PIXEL * (size.y - 1)));
 }
 
 // A camera that projects into them.
 FN CameraParameters camera_of_texels(CONTEXT_ARGUMENT CameraParameters camera, int model) {
   vec2 scale = texel_scale(CONTEXT_ONLY);
-  vec2 centre = texel_at(CONTEXT vec2(camera.intrinsics.z, camera.intrinsics.w));
+  vec2 centre = texel_at(CONTEXT camera.size, vec2(camera.intrinsics.z, camera.intrinsics.w));
   camera.intrinsics = vec4(scale.x * camera.intrinsics.x, scale.y * camera.intrinsics.y, centre.x, centre.y);
   camera.domain.z = scale.x * camera.domain.z;
   if (model == CAMERA_POLYNOMIAL_FISHEYE) camera.domain.w = scale.y * camera.domain.w;
@@ -251,7 +258,7 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   start.warp = warp_through(pair, m);
   vec2 centre;
   if (!warp_pixel(CONTEXT start.warp, camera, model, pixel, centre)) return false;
-  start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(CONTEXT centre));
+  start.centre_b = sample_image(CONTEXT source, camera.size, texel_at(CONTEXT camera.size, centre));
   start.centre_a = intensity_at(CONTEXT REFERENCE, pixel);
   if (!(min(start.centre_a, start.centre_b) >= 0.0f)) return false;
 #ifdef HAS_PATCH_TILE
@@ -261,7 +268,7 @@ FN bool begin_patch(CONTEXT_ARGUMENT ViewPair pair, CameraParameters camera, int
   if (!mapped) return patch_is_in_front(CONTEXT pixel, m);
   if (!map_patch(CONTEXT start.warp, camera, model, pixel, centre, start.map)) return false;
   if (WARP != WARP_QUADRATIC) start.map.u0 = start.map.u0 + mean_bend(start.map, radius);
-  start.map.u0 = texel_at(CONTEXT start.map.u0);
+  start.map.u0 = texel_at(CONTEXT camera.size, start.map.u0);
   vec2 scale = texel_scale(CONTEXT_ONLY);
   start.map.ux = to_texels(scale, start.map.ux);
   start.map.uy = to_texels(scale, start.map.uy);

@@ -26,10 +26,13 @@ constexpr int map_corners = 9;
 constexpr int weight_of_sample = 7;  // two products, a sum, an eighth power and a division
 constexpr int zncc_cost = 15;        // and the visible share's limit
 
-/// In the memory of texture units texels begin elsewhere.
-int texel_at(const KernelConstants& c) {
-  return (c.texels_per_pixel > 1 ? 2 : 0) + (c.filter == static_cast<int>(Filter::exact) ? 0 : 2);
-}
+bool is_exact(const KernelConstants& c) { return c.filter == static_cast<int>(Filter::exact); }
+
+/// Positions are drawn to the middle, unless texture units round them to more.
+bool is_scaled(const KernelConstants& c) { return c.texels_per_pixel > 1 || is_exact(c); }
+
+/// Two products, and the sums with where texels begin, or are drawn to.
+int texel_at(const KernelConstants& c) { return (is_scaled(c) ? 2 : 0) + (is_exact(c) ? 4 : 2); }
 
 /// Where texels are not pixels.
 int camera_of_texels(int model) {
@@ -201,7 +204,6 @@ double regression_operations(const Dispatch& dispatch) {
 PatchOperations patch_operations(const KernelConstants& c) {
   const bool exact = c.warp == static_cast<int>(PatchWarp::exact);
   const bool quadratic = c.warp == static_cast<int>(PatchWarp::quadratic);
-  const bool is_scaled = c.texels_per_pixel > 1;
   const int weighting = c.weighted != 0 ? weight_of_sample : 0;
   const int warp_sample = warp_direction + projection(c.camera_model);
   const int warp_ray = warp_sample + scalar_product + limit_of_field_of_view;
@@ -216,15 +218,15 @@ PatchOperations patch_operations(const KernelConstants& c) {
       side_of_source + warp_through + warp_ray + texel_at(c) + sample_image(c.filter) + zncc_cost;
   if (exact) {
     operations.of_patch +=
-        4 * scalar_product + texel_at(c) + (is_scaled ? camera_of_texels(c.camera_model) : 0);
+        4 * scalar_product + texel_at(c) + (is_scaled(c) ? camera_of_texels(c.camera_model) : 0);
   } else {
     const int anchors = quadratic ? 8 : 4;
     const int rows = 2 * c.window_radius + 1;
     operations.of_patch += anchors * warp_ray + 2 * map_axis + texel_at(c) +
-                           (quadratic ? 0 : mean_bend) + (is_scaled ? slopes_to_texels : 0) +
+                           (quadratic ? 0 : mean_bend) + (is_scaled(c) ? slopes_to_texels : 0) +
                            rows * (quadratic ? map_row_quadratic : map_row_affine);
   }
-  if (quadratic) operations.of_patch += map_corners + (is_scaled ? bends_to_texels : 0);
+  if (quadratic) operations.of_patch += map_corners + (is_scaled(c) ? bends_to_texels : 0);
   return operations;
 }
 

@@ -372,6 +372,30 @@ TEST_P(Parity, EveryCameraModelGivesTheBitsOfTheCpu) {
   expect_no_validation_messages(*device);
 }
 
+/// Rows lie on each other but for rounding, the first and the last one on the border.
+TEST_P(Parity, RectifiedPinholesGiveTheBitsOfTheCpu) {
+  OPEN_DEVICE_OR_SKIP(device, GetParam());
+  if (const std::string why = why_bits_may_differ(*device); !why.empty()) GTEST_SKIP() << why;
+  Rig rig = demo_rig(96);
+  for (View& view : rig.views) {
+    view.camera = Camera{};
+    view.camera.width = view.camera.height = 96;
+    view.camera.fx = view.camera.fy = 45.83;
+    view.camera.cx = 47.2;
+    view.camera.cy = 48.3;
+  }
+  rig.views[1].world_from_camera = rig.views[0].world_from_camera * Eigen::Translation3d(0.1, 0, 0);
+  const RenderedPair pair = render_demo_room(rig);
+  Options options = exact(Options::preset_named("fast"));
+  std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  const StereoResult result = expect_bits_of_the_cpu(*device, pair.rig, images_of(pair), options);
+  const cv::Mat& reasons = result.views[0].reasons;
+  for (const int row : {0, 95}) {
+    EXPECT_LT(cv::countNonZero(reasons.row(row) & REASON_NO_OVERLAP), 5) << row;
+  }
+  expect_no_validation_messages(*device);
+}
+
 // Back ends number the views of all levels, and have memory of many sizes.
 TEST_P(Parity, SixViewsOfTwoSizesGiveTheBitsOfTheCpu) {
   OPEN_DEVICE_OR_SKIP(device, GetParam());

@@ -223,6 +223,36 @@ TEST(Checks, TheBestOfSeveralSourcesCounts) {
   }
 }
 
+/// Far beyond its image a pinhole's model moves points as fast as anything.
+TEST(Checks, SourcesInWhichThePointDoesNotLandTellNoSpeed) {
+  Rig rig = fisheye_rig(96);
+  for (View& view : rig.views) {
+    view.camera.model = CameraModel::pinhole;
+    view.camera.fx = view.camera.fy = 48;
+  }
+  const auto speed_at = [&](ivec2 pixel) {
+    KernelFixture fixture(rig, wide_range());
+    fixture.set_reference(0);
+    return kernel::cpu::speed_in_sources(fixture.context(), pixel,
+                                         to_kernel(fixture.view(0).rays(pixel.y, pixel.x)), 0.5f);
+  };
+  const ivec2 seen_by_both(80, 48), seen_by_one(20, 48);
+  const float of_pair = speed_at(seen_by_one);
+  EXPECT_GT(of_pair, 1);
+  rig.views.push_back(rig.views[1]);
+  rig.views[2].name = "cam2";
+  rig.views[2].world_from_camera.translation().y() += 0.01;
+  rig.views[2].world_from_camera.rotate(
+      Eigen::AngleAxisd(50 * radians_per_degree, Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(speed_at(seen_by_one), of_pair);
+  std::swap(rig.views[1], rig.views[2]);
+  EXPECT_EQ(speed_at(seen_by_one), of_pair);
+  const float of_all = speed_at(seen_by_both);
+  rig.views.pop_back();
+  EXPECT_EQ(of_all, std::max(speed_at(seen_by_both), of_all));
+  EXPECT_GT(speed_at(seen_by_one), 3 * of_pair) << "where no other sees the point";
+}
+
 TEST(Checks, ForAVoteTellWhatTheSourceShowsOfThePoint) {
   const Eigen::Vector3d normal = Eigen::Vector3d(0.1, 0.2, 1).normalized();
   AgreeingViews views(wide_range(), normal / 2);

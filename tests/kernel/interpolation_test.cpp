@@ -39,8 +39,9 @@ class Interpolated : public ::testing::TestWithParam<Interpolation> {
   float sample(double x, double y) {
     const vec2 position(static_cast<float>(x), static_cast<float>(y));
     const kernel::cpu::Context context = fixture_.context();
-    return kernel::cpu::sample_image(context, 0, context.parameters.cameras[0].size,
-                                     kernel::cpu::texel_at(context, position));
+    const kernel::ivec4 of_image = context.parameters.cameras[0].size;
+    return kernel::cpu::sample_image(context, 0, of_image,
+                                     kernel::cpu::texel_at(context, of_image, position));
   }
 
   double root_mean_square_error(const Function& function) {
@@ -63,7 +64,7 @@ class Interpolated : public ::testing::TestWithParam<Interpolation> {
 TEST_P(Interpolated, PixelsKeepTheirIntensitiesAndRampsAreExact) {
   const Function ramp = [](double x, double y) { return 0.1 + 0.007 * x + 0.004 * y; };
   fill(ramp);
-  EXPECT_EQ(sample(20, 31), fixture_.view(0).image()(31, 20));
+  EXPECT_FLOAT_EQ(sample(20, 31), fixture_.view(0).image()(31, 20));
   EXPECT_LT(root_mean_square_error(ramp), 1e-6);
 }
 
@@ -104,7 +105,7 @@ TEST_P(Interpolated, NothingIsSeenBesideMaskedPixelsAndTheBorder) {
                              {20.0, 64.0}}) {
     EXPECT_LT(sample(x, y), 0) << x << ", " << y;
   }
-  for (const auto& [x, y] : {std::pair(29.0, 30.0),
+  for (const auto& [x, y] : {std::pair(28.99, 30.0),
                              {28.5, 30.3},
                              {31.7, 30.5},
                              {30.4, 28.5},
@@ -113,6 +114,20 @@ TEST_P(Interpolated, NothingIsSeenBesideMaskedPixelsAndTheBorder) {
                              {62.5, 63.0},
                              {63.0, 63.0}}) {
     EXPECT_NEAR(static_cast<double>(sample(x, y)), ramp(x, y), 1e-6) << x << ", " << y;
+  }
+}
+
+/// Rows of rectified cameras lie on each other but for rounding.
+TEST_P(Interpolated, PixelsOfTheBorderAreSeenInSpiteOfRounding) {
+  const Function ramp = [](double x, double y) { return 0.1 + 0.007 * x + 0.004 * y; };
+  fill(ramp);
+  for (const double beyond : {0.0, 1e-9, 1e-8, 3e-8, 1e-6, 5e-6}) {
+    for (const double at : {0.0, 10.0, 63.0}) {
+      for (const double border : {-beyond, 63 + beyond}) {
+        EXPECT_NEAR(static_cast<double>(sample(at, border)), ramp(at, border), 1e-5) << beyond;
+        EXPECT_NEAR(static_cast<double>(sample(border, at)), ramp(border, at), 1e-5) << beyond;
+      }
+    }
   }
 }
 

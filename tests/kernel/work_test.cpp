@@ -41,9 +41,11 @@ counting::Counts run_patch(const Options& options, CameraModel model) {
   return counting::counts;
 }
 
-TEST(Work, OfPositionsInTexelsIsNothingWhereTheseArePixels) {
+TEST(Work, OfPositionsInTexelsIsNothingWhereTextureUnitsTakePixels) {
   for (const PatchWarp warp : {PatchWarp::exact, PatchWarp::affine, PatchWarp::quadratic}) {
-    KernelConstants constants{.warp = static_cast<int>(warp), .texels_per_pixel = 2};
+    KernelConstants constants{.warp = static_cast<int>(warp),
+                              .filter = static_cast<int>(Filter::device),
+                              .texels_per_pixel = 2};
     const PatchOperations of_half_pixels = patch_operations(constants);
     constants.texels_per_pixel = 1;
     const PatchOperations of_pixels = patch_operations(constants);
@@ -76,8 +78,9 @@ TEST(Work, OfAPatchIsWhatRunningItTakes) {
                                           .texels_per_pixel = 2};
           const long long samples = kernel::samples_of_patch(3, static_cast<int>(pattern));
           const PatchOperations expected = patch_operations(constants);
-          // Two products with the weight, which compilers leave out where it is one.
-          const long long left_out = weight_scale > 0 ? 0 : 2 * samples;
+          // Two products with the weight, which compilers leave out where it is one, and of two
+          // constants, texels a pixel drawn to the middle.
+          const long long left_out = (weight_scale > 0 ? 0 : 2 * samples) + 3;
           EXPECT_EQ(run.operations - left_out, expected.of_sample * samples + expected.of_patch);
           EXPECT_EQ(run.texels, 4 * (samples + 1));  // and the centre's
         }
