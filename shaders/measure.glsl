@@ -8,6 +8,8 @@
 #define NOISE_OF_SLOPES 0.25f
 // Share of a patch's information that is believed in any case.
 #define LEAST_SHARE 0.05f
+// Share of a match's variance that is the reference's noise, which the matches in all sources have in common.
+#define COMMON_SHARE 0.5f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
 
@@ -78,66 +80,113 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
   return chosen;
 }
 
+// Whether a source besides the chosen one of agreeing_source() tells of the pixel's distance: its own plane agrees.
+// `longest`: the longest squared baseline across the ray.
+FN bool tells_too(CONTEXT_ARGUMENT int source, int chosen, ivec2 pixel, vec3 ray, vec3 m, float longest) {
+  return source != chosen && tells_distance(CONTEXT source, ray, longest) &&
+         difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.check_limits.y;
+}
+
+// Sums over a patch of the reference, weighted.
+struct PatchGradients {
+  float n;
+  float sum;           // of intensities, relative to the pixel's own
+  float sum_squares;   // likewise
+  vec2 gradients;      // sum
+  vec2 products;       // of intensities and gradients
+  vec3 squares;        // of gradients: xx, xy, yy
+};
+
+FN PatchGradients gradients_of_patch(CONTEXT_ARGUMENT ivec2 pixel) {
+  float centre = intensity_at(CONTEXT REFERENCE, pixel);
+  float inverse_scale = PARAMETERS.support.x;
+  PatchGradients g;
+  g.n = 0.0f;
+  g.sum = 0.0f;
+  g.sum_squares = 0.0f;
+  g.gradients = vec2(0.0f, 0.0f);
+  g.products = vec2(0.0f, 0.0f);
+  g.squares = vec3(0.0f, 0.0f, 0.0f);
+  for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
+    for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
+      float a;
+      vec2 gradient;
+      if (!gradient_at(CONTEXT ivec2(pixel.x + dx, pixel.y + dy), a, gradient)) continue;
+      a -= centre;
+      float weight = sample_weight(CONTEXT a, inverse_scale);
+      vec2 weighted = weight * gradient;
+      g.n += weight;
+      g.sum += weight * a;
+      g.sum_squares += weight * a * a;
+      g.gradients = g.gradients + weighted;
+      g.products = g.products + a * weighted;
+      g.squares = g.squares + vec3(weighted.x * gradient.x, weighted.x * gradient.y, weighted.y * gradient.y);
+    }
+  }
+  return g;
+}
+
+// Of the pixel's match in a source, along the epipolar curve (px^2): that of the patch's residual over the information of
+// its gradients, net of what gain and offset of the intensities explain, too, and of noise, and the square of half the
+// displacement from the source's own plane, which exposes what the patch itself cannot tell. `velocity`: not zero.
+FN float variance_in_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec4 held, vec2 velocity,
+                            PatchGradients g) {
+  vec3 m = vec3(held.x, held.y, held.z);
+  vec2 along = (1.0f / length(velocity)) * velocity;
+  vec2 direction = reference_direction(CONTEXT source, pixel, m, along);
+  float information = direction.x * direction.x * g.squares.x + 2.0f * direction.x * direction.y * g.squares.y +
+                      direction.y * direction.y * g.squares.z;
+  float slopes = dot(direction, g.gradients);
+  float products = dot(direction, g.products);
+  float least = LEAST_SHARE * information;
+  float per_sample = g.n > 0.0f ? 1.0f / g.n : 0.0f;
+  float spread = max((g.sum_squares - per_sample * g.sum * g.sum) * per_sample, 0.0f);
+  float residual = spread * held.w * (2.0f - held.w) + 1e-7f;
+  float along_gain = products - per_sample * g.sum * slopes;
+  information -= per_sample * (slopes * slopes + along_gain * along_gain / max(spread, 1e-9f));
+  information = max(information - NOISE_OF_SLOPES * g.n * residual, least);
+  // The checkerboard leaves out every other pixel, whose information is about the same.
+  float correlation = 1.0f - held.w;
+  information *= float(COLUMN_STEP) * correlation * correlation;
+  if (!(information > 0.0f)) return UNMEASURED_VARIANCE;
+  vec2 difference = difference_from_source(CONTEXT source, pixel, ray, m);
+  float displacement = difference.y < UNKNOWN_DIFFERENCE ? min(difference.y, LARGEST_DISPLACEMENT)
+                                                         : UNCHECKED_DISPLACEMENT;
+  return min(residual / information + SMALLEST_VARIANCE + 0.25f * displacement * displacement, UNMEASURED_VARIANCE);
+}
+
 // Stores all that regress_pixel() needs of a neighbour: the variance of its match along the epipolar curve (px^2), the
-// speed there (pixels per unit of inverse distance, 0 where nothing matches), its inverse distance and intensity. The
-// variance is that of the patch's residual over the information of its gradients, net of what gain and offset of the
-// intensities explain, too, and of noise, and the square of half the displacement from the source's own plane, which
-// exposes what the patch itself cannot tell.
+// speed there (pixels per unit of inverse distance, 0 where nothing matches), its inverse distance and intensity. Where
+// several sources tell the distance, the variance is that of all of them, as if along the curve of the one that tells most.
 FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = vec3(held.x, held.y, held.z);
-  float correlation = 1.0f - held.w;
-  float centre = intensity_at(CONTEXT REFERENCE, pixel);
   float speed = 0.0f;
   float variance = UNMEASURED_VARIANCE;
   float w = inverse_distance_of(held, ray);
-  if (is_usable(CONTEXT pixel, usable_ray) && correlation > 0.05f) {
+  if (is_usable(CONTEXT pixel, usable_ray) && 1.0f - held.w > 0.05f) {
     vec2 velocity;
-    int source = agreeing_source(CONTEXT pixel, ray, m, velocity);
+    int chosen = agreeing_source(CONTEXT pixel, ray, m, velocity);
     speed = length(velocity);
-    vec2 along = (1.0f / max(speed, 1e-9f)) * velocity;
-    vec2 direction = reference_direction(CONTEXT source, pixel, m, along);
-    float inverse_scale = PARAMETERS.support.x;
-    float information = 0.0f;
-    float n = 0.0f;
-    float sum = 0.0f;
-    float sum_squares = 0.0f;
-    float sum_slopes = 0.0f;
-    float sum_products = 0.0f;
-    for (int dy = -WINDOW_RADIUS; dy <= WINDOW_RADIUS; ++dy) {
-      for (int dx = first_column(CONTEXT WINDOW_RADIUS, dy); dx <= WINDOW_RADIUS; dx += COLUMN_STEP) {
-        ivec2 q = ivec2(pixel.x + dx, pixel.y + dy);
-        float a;
-        float slope;
-        if (!slope_at(CONTEXT q, direction, a, slope)) continue;
-        a -= centre;
-        float weight = sample_weight(CONTEXT a, inverse_scale);
-        information += weight * slope * slope;
-        n += weight;
-        sum += weight * a;
-        sum_squares += weight * a * a;
-        sum_slopes += weight * slope;
-        sum_products += weight * a * slope;
+    if (speed > 0.0f) {
+      PatchGradients g = gradients_of_patch(CONTEXT pixel);
+      variance = variance_in_source(CONTEXT chosen, pixel, ray, held, velocity, g);
+      if (SOURCE_COUNT > 1) {
+        float per_variance = speed * speed / variance;
+        float longest = longest_squared_baseline_across(CONTEXT ray);
+        for (int i = 0; i < SOURCE_COUNT; ++i) {
+          int source = source_at(CONTEXT i);
+          if (!tells_too(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
+          velocity = source_velocity(CONTEXT source, ray, w);
+          float squared_speed = dot(velocity, velocity);
+          if (!(squared_speed > 0.0f)) continue;
+          per_variance += squared_speed / variance_in_source(CONTEXT source, pixel, ray, held, velocity, g);
+        }
+        variance = COMMON_SHARE * variance + (1.0f - COMMON_SHARE) * (speed * speed / per_variance);
       }
     }
-    float least = LEAST_SHARE * information;
-    float per_sample = n > 0.0f ? 1.0f / n : 0.0f;
-    float spread = max((sum_squares - per_sample * sum * sum) * per_sample, 0.0f);
-    float residual = spread * held.w * (2.0f - held.w) + 1e-7f;
-    float along_gain = sum_products - per_sample * sum * sum_slopes;
-    information -= per_sample * (sum_slopes * sum_slopes + along_gain * along_gain / max(spread, 1e-9f));
-    information = max(information - NOISE_OF_SLOPES * n * residual, least);
-    // The checkerboard leaves out every other pixel, whose information is about the same.
-    information *= float(COLUMN_STEP) * correlation * correlation;
-    if (speed > 0.0f && information > 0.0f) {
-      vec2 difference = difference_from_source(CONTEXT source, pixel, ray, m);
-      float displacement = difference.y < UNKNOWN_DIFFERENCE ? min(difference.y, LARGEST_DISPLACEMENT)
-                                                             : UNCHECKED_DISPLACEMENT;
-      variance = min(residual / information + SMALLEST_VARIANCE + 0.25f * displacement * displacement,
-                     UNMEASURED_VARIANCE);
-    }
   }
-  store_check(CONTEXT REFERENCE, pixel, vec4(variance, speed, w, centre));
+  store_check(CONTEXT REFERENCE, pixel, vec4(variance, speed, w, intensity_at(CONTEXT REFERENCE, pixel)));
 }

@@ -182,6 +182,57 @@ TEST(AgreeingSource, IsTheFastestOfThoseThatAgreeAndTellDistances) {
   EXPECT_EQ(chosen({1, 0.01}), 1) << "the other one would agree with any plane";
 }
 
+/// The noise of each is its own.
+TEST(SeveralSources, TellMoreThanOneWhereTheyAgree) {
+  Rig rig = fisheye_rig(size);
+  View& third = rig.views.emplace_back(rig.views[1]);
+  third.name = "cam2";
+  third.world_from_camera.translation() *= -1;
+  KernelFixture fixture(rig, wide_range("fast"));
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+  const Eigen::Vector3d wall = normal / 2;
+  fixture.show(render_plane(rig, normal, 2));
+  for (int i = 0; i < 3; ++i) {
+    cv::Mat image = fixture.view(i).image();
+    cv::Mat noise(image.size(), CV_32FC1);
+    cv::RNG(static_cast<std::uint64_t>(i + 1)).fill(noise, cv::RNG::NORMAL, 0, 6.0 / 255);
+    cv::add(image, noise, image, image >= 0);
+    image = cv::max(image, MASKED_INTENSITY);
+  }
+  fixture.interpolate();
+  fixture.set_reference(0);
+  fixture.pass().candidates = WHOLE_SHIFT;
+  struct Found {
+    double error = 0, variance = 0;  // px, px^2
+  };
+  const auto found = [&] {
+    Found sums;
+    int count = 0;
+    for (int y = 24; y < size - 24; y += step) {
+      for (int x = 24; x < size - 24; x += step, ++count) {
+        kernel::cpu::measure_pixel(fixture.context(), {x, y});
+        const cv::Vec4f measure = fixture.view(0).checks(y, x);
+        kernel::cpu::subpixel_pixel(fixture.context(), {x, y});
+        const double w = static_cast<double>(fixture.view(0).checks(y, x)[2]);
+        sums.error +=
+            std::pow((w - wall.dot(fixture.ray(0, {x, y}))) * static_cast<double>(measure[1]), 2);
+        sums.variance += static_cast<double>(measure[0]);
+      }
+    }
+    return Found{std::sqrt(sums.error / count), sums.variance / count};
+  };
+  fixture.hold_in_all_views(to_kernel(wall));
+  const Found of_both = found();
+  for (const int wrong : {1, 2}) {
+    fixture.hold_in_all_views(to_kernel(wall));
+    fixture.view(wrong).hypotheses *= 3;
+    const Found of_one = found();
+    EXPECT_LT(of_both.error, 0.9 * of_one.error) << wrong;
+    EXPECT_GT(of_both.variance, 0.65 * of_one.variance) << wrong;
+    EXPECT_LT(of_both.variance, 0.85 * of_one.variance) << wrong;
+  }
+}
+
 /// Of planes that are 0.3 px off and matches that are not precise.
 TEST(SubpixelMatch, TakesAllOfTheShiftOrTheShareThatThePrecisionIsWorth) {
   KernelFixture fixture(fisheye_rig(128), wide_range("fast"));
