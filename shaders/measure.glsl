@@ -169,22 +169,24 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   if (is_usable(CONTEXT pixel, usable_ray) && 1.0f - held.w > 0.05f) {
     vec2 velocity;
     int chosen = agreeing_source(CONTEXT pixel, ray, m, velocity);
+    // Not the product of roots, of which compilers take what they are of.
+    float squared_speed = dot(velocity, velocity);
     speed = length(velocity);
     if (speed > 0.0f) {
       PatchGradients g = gradients_of_patch(CONTEXT pixel);
       variance = variance_in_source(CONTEXT chosen, pixel, ray, held, velocity, g);
       if (SOURCE_COUNT > 1) {
-        float per_variance = speed * speed / variance;
+        float per_variance = squared_speed / variance;
         float longest = longest_squared_baseline_across(CONTEXT ray);
         for (int i = 0; i < SOURCE_COUNT; ++i) {
           int source = source_at(CONTEXT i);
           if (!tells_too(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
           velocity = source_velocity(CONTEXT source, ray, w);
-          float squared_speed = dot(velocity, velocity);
-          if (!(squared_speed > 0.0f)) continue;
-          per_variance += squared_speed / variance_in_source(CONTEXT source, pixel, ray, held, velocity, g);
+          float squared = dot(velocity, velocity);
+          if (!(squared > 0.0f)) continue;
+          per_variance += squared / variance_in_source(CONTEXT source, pixel, ray, held, velocity, g);
         }
-        variance = COMMON_SHARE * variance + (1.0f - COMMON_SHARE) * (speed * speed / per_variance);
+        variance = COMMON_SHARE * variance + (1.0f - COMMON_SHARE) * (squared_speed / per_variance);
       }
     }
   }

@@ -74,7 +74,7 @@ FN vec2 shift_in_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 v
   float per_speed = 1.0f / speed;
   vec2 direction = reference_direction(CONTEXT source, pixel, m, per_speed * velocity);
   vec2 shift = subpixel_shift(CONTEXT source, pixel, m, direction);
-  return vec2(per_speed * shift.x, speed * speed * shift.y);
+  return vec2(per_speed * shift.x, dot(velocity, velocity) * shift.y);
 }
 
 // Of a pixel that was measured: the inverse distance is where its patch matches best instead of where the search has

@@ -376,6 +376,7 @@ TEST_P(VulkanTextures, AreMatchedAsTheMatcherDoes) {
   const RenderedPair pair = render_demo(side);
   Options options = Options::preset_named("fast");
   std::tie(options.min_distance, options.max_distance) = demo_distance_range();
+  options.max_gain = 1;  // which an application's images have
   VulkanMatcher matcher(application.context.handles(), pair.rig, options);
   std::vector<cv::Mat> images = device_images_of(pair, GetParam().pixel);
   if (GetParam().colour) {
