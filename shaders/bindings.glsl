@@ -59,9 +59,10 @@ layout(set = 0, binding = 7) uniform sampler2DArray texel_texture;
 #ifdef TEXEL_LOADS
 layout(set = 0, binding = 8, rgba32f) uniform image2DArray texels;  // with the right, lower and lower right one
 #elif defined HALF_PRECISION
-layout(set = 0, binding = 8, r16f) uniform image2DArray texels;
+// Read by texture units alone: not all GPUs read and write one image of every format.
+layout(set = 0, binding = 8, r16f) writeonly uniform image2DArray texels;
 #else
-layout(set = 0, binding = 8, r32f) uniform image2DArray texels;
+layout(set = 0, binding = 8, r32f) writeonly uniform image2DArray texels;
 #endif
 layout(set = 0, binding = 9, std430) buffer NearestBlock { uint transfer_nearest[]; };
 layout(set = 0, binding = 10, std430) buffer WinnerBlock { uint transfer_winner[]; };
