@@ -80,21 +80,22 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
   return chosen;
 }
 
-// Whether a source besides the chosen one of agreeing_source() tells of the pixel's distance: its own plane agrees.
+// Whether a source tells of the pixel's distance: the chosen one of agreeing_source(), and others whose own planes agree.
 // `longest`: the longest squared baseline across the ray.
-FN bool tells_too(CONTEXT_ARGUMENT int source, int chosen, ivec2 pixel, vec3 ray, vec3 m, float longest) {
-  return source != chosen && tells_distance(CONTEXT source, ray, longest) &&
+FN bool counts_for(CONTEXT_ARGUMENT int source, int chosen, ivec2 pixel, vec3 ray, vec3 m, float longest) {
+  if (source == chosen) return true;
+  return tells_distance(CONTEXT source, ray, longest) &&
          difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.check_limits.y;
 }
 
 // Sums over a patch of the reference, weighted.
 struct PatchGradients {
   float n;
-  float sum;           // of intensities, relative to the pixel's own
-  float sum_squares;   // likewise
-  vec2 gradients;      // sum
-  vec2 products;       // of intensities and gradients
-  vec3 squares;        // of gradients: xx, xy, yy
+  float sum;          // of intensities, relative to the pixel's own
+  float sum_squares;  // likewise
+  vec2 gradients;
+  vec2 products;  // of intensities and gradients
+  vec3 squares;   // of gradients: xx, xy, yy
 };
 
 FN PatchGradients gradients_of_patch(CONTEXT_ARGUMENT ivec2 pixel) {
@@ -167,27 +168,27 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float variance = UNMEASURED_VARIANCE;
   float w = inverse_distance_of(held, ray);
   if (is_usable(CONTEXT pixel, usable_ray) && 1.0f - held.w > 0.05f) {
-    vec2 velocity;
-    int chosen = agreeing_source(CONTEXT pixel, ray, m, velocity);
+    vec2 fastest;
+    int chosen = agreeing_source(CONTEXT pixel, ray, m, fastest);
     // Not the product of roots, of which compilers take what they are of.
-    float squared_speed = dot(velocity, velocity);
-    speed = length(velocity);
-    if (speed > 0.0f) {
-      PatchGradients g = gradients_of_patch(CONTEXT pixel);
-      variance = variance_in_source(CONTEXT chosen, pixel, ray, held, velocity, g);
-      if (SOURCE_COUNT > 1) {
-        float per_variance = squared_speed / variance;
-        float longest = longest_squared_baseline_across(CONTEXT ray);
-        for (int i = 0; i < SOURCE_COUNT; ++i) {
-          int source = source_at(CONTEXT i);
-          if (!tells_too(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
-          velocity = source_velocity(CONTEXT source, ray, w);
-          float squared = dot(velocity, velocity);
-          if (!(squared > 0.0f)) continue;
-          per_variance += squared / variance_in_source(CONTEXT source, pixel, ray, held, velocity, g);
-        }
-        variance = COMMON_SHARE * variance + (1.0f - COMMON_SHARE) * (squared_speed / per_variance);
-      }
+    float squared_speed = dot(fastest, fastest);
+    speed = length(fastest);
+    PatchGradients g = gradients_of_patch(CONTEXT pixel);
+    float longest = longest_squared_baseline_across(CONTEXT ray);
+    float per_variance = 0.0f;
+    for (int i = 0; i < SOURCE_COUNT; ++i) {
+      int source = source_at(CONTEXT i);
+      if (!counts_for(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
+      vec2 velocity = fastest;
+      if (source != chosen) velocity = source_velocity(CONTEXT source, ray, w);
+      float squared = dot(velocity, velocity);
+      if (!(squared > 0.0f)) continue;
+      float of_source = variance_in_source(CONTEXT source, pixel, ray, held, velocity, g);
+      if (source == chosen) variance = of_source;
+      per_variance += squared / of_source;
+    }
+    if (SOURCE_COUNT > 1 && speed > 0.0f) {
+      variance = COMMON_SHARE * variance + (1.0f - COMMON_SHARE) * (squared_speed / per_variance);
     }
   }
   store_check(CONTEXT REFERENCE, pixel, vec4(variance, speed, w, intensity_at(CONTEXT REFERENCE, pixel)));

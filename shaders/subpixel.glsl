@@ -86,25 +86,25 @@ FN void subpixel_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   vec3 m = vec3(held.x, held.y, held.z);
   if (measure.x >= UNMEASURED_VARIANCE) return;
-  vec2 velocity;
-  int chosen = agreeing_source(CONTEXT pixel, ray, m, velocity);
-  vec2 shift = shift_in_source(CONTEXT chosen, pixel, m, velocity);
-  if (SOURCE_COUNT > 1) {
-    float sum = shift.y * shift.x;
-    float longest = longest_squared_baseline_across(CONTEXT ray);
-    for (int i = 0; i < SOURCE_COUNT; ++i) {
-      int source = source_at(CONTEXT i);
-      if (!tells_too(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
-      vec2 other = shift_in_source(CONTEXT source, pixel, m, source_velocity(CONTEXT source, ray, dot(m, ray)));
-      sum += other.y * other.x;
-      shift.y += other.y;
-    }
-    shift.x = shift.y > 0.0f ? sum / shift.y : 0.0f;
+  vec2 fastest;
+  int chosen = agreeing_source(CONTEXT pixel, ray, m, fastest);
+  float longest = longest_squared_baseline_across(CONTEXT ray);
+  float shift = 0.0f;
+  float information = 0.0f;
+  for (int i = 0; i < SOURCE_COUNT; ++i) {
+    int source = source_at(CONTEXT i);
+    if (!counts_for(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
+    vec2 velocity = fastest;
+    if (source != chosen) velocity = source_velocity(CONTEXT source, ray, dot(m, ray));
+    vec2 of_source = shift_in_source(CONTEXT source, pixel, m, velocity);
+    shift += of_source.y * of_source.x;
+    information += of_source.y;
   }
+  if (!(information > 0.0f)) return;
   // What a precise patch still asks for is less its noise than a second surface in it. Where frames are averaged, each tells
   // all that it can by itself.
   bool whole = (PASS.candidates & WHOLE_SHIFT) != 0u;
   float share = whole ? 1.0f : measure.x / (measure.x + HALF_SHIFT_VARIANCE);
-  measure.z -= share * shift.x;
+  measure.z -= share * (shift / information);
   store_check(CONTEXT REFERENCE, pixel, measure);
 }
