@@ -83,7 +83,7 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
 // Whether a source tells of the pixel's distance: the chosen one of agreeing_source(), and others whose own planes agree.
 // `longest`: the longest squared baseline across the ray.
 FN bool counts_for(CONTEXT_ARGUMENT int source, int chosen, ivec2 pixel, vec3 ray, vec3 m, float longest) {
-  if (source == chosen) return true;
+  if (SOURCE_COUNT == 1 || source == chosen) return true;
   return tells_distance(CONTEXT source, ray, longest) &&
          difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.check_limits.y;
 }
@@ -180,11 +180,11 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       int source = source_at(CONTEXT i);
       if (!counts_for(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
       vec2 velocity = fastest;
-      if (source != chosen) velocity = source_velocity(CONTEXT source, ray, w);
+      if (SOURCE_COUNT > 1 && source != chosen) velocity = source_velocity(CONTEXT source, ray, w);
       float squared = dot(velocity, velocity);
       if (!(squared > 0.0f)) continue;
       float of_source = variance_in_source(CONTEXT source, pixel, ray, held, velocity, g);
-      if (source == chosen) variance = of_source;
+      if (SOURCE_COUNT == 1 || source == chosen) variance = of_source;
       per_variance += squared / of_source;
     }
     if (SOURCE_COUNT > 1 && speed > 0.0f) {

@@ -95,7 +95,7 @@ FN void subpixel_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int source = source_at(CONTEXT i);
     if (!counts_for(CONTEXT source, chosen, pixel, ray, m, longest)) continue;
     vec2 velocity = fastest;
-    if (source != chosen) velocity = source_velocity(CONTEXT source, ray, dot(m, ray));
+    if (SOURCE_COUNT > 1 && source != chosen) velocity = source_velocity(CONTEXT source, ray, dot(m, ray));
     vec2 of_source = shift_in_source(CONTEXT source, pixel, m, velocity);
     shift += of_source.y * of_source.x;
     information += of_source.y;
