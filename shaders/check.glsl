@@ -61,16 +61,16 @@ FN float turn_in_source(CONTEXT_ARGUMENT int source, vec3 ray, float w) {
 // epipole. Far beyond its image a camera's model may tell any speed.
 FN float speed_in_sources(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w) {
   float speed = 0.0f;
-  float speed_of_others = 0.0f;
+  float speed_of_all = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) {
     int source = source_at(CONTEXT i);
     float of_source = length(source_velocity(CONTEXT source, ray, w));
     bool sees = SOURCE_COUNT == 1 || is_unmasked_in_source(CONTEXT source, ray, w);
     speed = max(speed, sees ? of_source : 0.0f);
-    speed_of_others = max(speed_of_others, of_source);
+    speed_of_all = max(speed_of_all, of_source);
   }
   if (speed > 0.0f) return speed;
-  if (speed_of_others > 0.0f) return speed_of_others;
+  if (speed_of_all > 0.0f) return speed_of_all;
   float turn = 0.0f;
   for (int i = 0; i < SOURCE_COUNT; ++i) turn = max(turn, turn_in_source(CONTEXT source_at(CONTEXT i), ray, w));
   float angle = length(step_of_ray(CONTEXT pixel, ray, ivec2(1, 0)));

@@ -56,15 +56,19 @@ FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity,
   return seen;
 }
 
+// Whether the source's own plane agrees with the pixel's, so that nothing hides the point there.
+FN bool agrees(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec3 m) {
+  return difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.check_limits.y;
+}
+
 // The source that tells most of those whose own planes agree with the pixel's, for the point may be hidden in others; of
 // all where none agrees. `velocity`: the movement there.
 FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2) velocity) {
   float w = dot(m, ray);
   int chosen = telling_source(CONTEXT ray, w, velocity);
   if (SOURCE_COUNT == 1) return chosen;
-  float limit = PARAMETERS.check_limits.y;
   // Of those in which the point lands it is the fastest, and in others nothing agrees.
-  if (difference_from_source(CONTEXT chosen, pixel, ray, m).y <= limit) return chosen;
+  if (agrees(CONTEXT chosen, pixel, ray, m)) return chosen;
   float fastest = 0.0f;
   float longest = longest_squared_baseline_across(CONTEXT ray);
   for (int i = 0; i < SOURCE_COUNT; ++i) {
@@ -72,7 +76,7 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
     if (!tells_distance(CONTEXT source, ray, longest)) continue;
     vec2 v = source_velocity(CONTEXT source, ray, w);
     float speed = length(v);
-    if (speed <= fastest || difference_from_source(CONTEXT source, pixel, ray, m).y > limit) continue;
+    if (speed <= fastest || !agrees(CONTEXT source, pixel, ray, m)) continue;
     chosen = source;
     velocity = v;
     fastest = speed;
@@ -84,8 +88,7 @@ FN int agreeing_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m, OUT(vec2)
 // `longest`: the longest squared baseline across the ray.
 FN bool counts_for(CONTEXT_ARGUMENT int source, int chosen, ivec2 pixel, vec3 ray, vec3 m, float longest) {
   if (SOURCE_COUNT == 1 || source == chosen) return true;
-  return tells_distance(CONTEXT source, ray, longest) &&
-         difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.check_limits.y;
+  return tells_distance(CONTEXT source, ray, longest) && agrees(CONTEXT source, pixel, ray, m);
 }
 
 // Sums over a patch of the reference, weighted.

@@ -242,7 +242,7 @@ TEST(RigRefinement, LeavesOutWhatIsMasked) {
     }
     EXPECT_EQ(masked > 200, begin > 300) << "half of the first pair's";
     const RigRefinement refined = refine_rig(calibrated, matches);
-    EXPECT_LT(rotation_error(refined.rig, truth, 1), 5e-4) << begin;
+    EXPECT_LT(rotation_error(refined.rig, truth, 1), 2e-4) << begin;
   }
 }
 

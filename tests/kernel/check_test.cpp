@@ -249,7 +249,7 @@ TEST(Checks, SourcesInWhichThePointDoesNotLandTellNoSpeed) {
   EXPECT_EQ(speed_at(seen_by_one), of_pair);
   const float of_all = speed_at(seen_by_both);
   rig.views.pop_back();
-  EXPECT_EQ(of_all, std::max(speed_at(seen_by_both), of_all));
+  EXPECT_GE(of_all, speed_at(seen_by_both));
   EXPECT_GT(speed_at(seen_by_one), 3 * of_pair) << "where no other sees the point";
 }
 
