@@ -6,14 +6,24 @@
 #define FAR_SHARE 0.25f
 // Displacement (source pixels) up to which planes belong to one surface.
 #define SURFACE_DISPLACEMENT 1.0f
-// In which the nearest accepted pixels are looked for, and what stands for none.
+// In which the nearest accepted pixels are looked for, what stands for none, and more than the farthest is away.
 #define DIRECTIONS 8
 #define NO_PLACE 3e38f
+#define BEYOND_ALL_STEPS 16384
 // How much worse than the pixel's own a plane may match that takes its place.
 #define LARGEST_EXTRA_COST 0.1f
 
-// Stores as prior (m, 1) the plane that the pixel would take over, zero where there is none: the median of the
-// surface at the FAR_SHARE of the planes around, both weighted by likeness of intensity.
+// That step of that direction, as a number from 1 on which floats hold exactly, and its place from the pixel.
+FN int numbered_step(int direction, int step) { return direction * BEYOND_ALL_STEPS + step; }
+
+FN ivec2 place_of_step(int number) {
+  int direction = number / BEYOND_ALL_STEPS;
+  int step = number % BEYOND_ALL_STEPS;
+  return ivec2(step * (direction % 3 - 1), step * (direction / 3 - 1));
+}
+
+// Stores as the prior's w where the plane lies that the pixel would take over (numbered_step()), zero where there is none:
+// the median of the surface at the FAR_SHARE of the planes around, both weighted by likeness of intensity.
 FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
@@ -23,11 +33,11 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   // Sorted by the inverse distance that planes have at the pixel; constant indices alone keep them in registers.
   float places[DIRECTIONS];
   float weights[DIRECTIONS];
-  int pixels[DIRECTIONS];
+  int steps[DIRECTIONS];
   UNROLL for (int i = 0; i < DIRECTIONS; ++i) {
     places[i] = NO_PLACE;
     weights[i] = 0.0f;
-    pixels[i] = 0;
+    steps[i] = 0;
   }
   float total = 0.0f;
   uint reasons = uint(check_at(CONTEXT REFERENCE, pixel).w);
@@ -39,9 +49,11 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int reach = dx == 0 || dy == 0 ? PASS.radius : PASS.radius * 7 / 10;
     // The nearest accepted one first, what is done with it after the loop: software devices would do it every step.
     ivec2 q = pixel;
+    int number = 0;
     bool accepted = false;
     for (int k = 1; k <= reach && !accepted; ++k) {
       q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
+      number = numbered_step(i, k);
       if (!in_image(size, q)) break;
       accepted = check_at(CONTEXT REFERENCE, q).w == 0.0f;
     }
@@ -52,7 +64,6 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float place = dot(m, ray);
     float weight =
         1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
-    int index = q.y * size.x + q.x;
     total += weight;
     // All from its place on move on by one, so that of equal ones the first found stays first.
     bool comes_first = false;
@@ -60,16 +71,17 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
       comes_first = comes_first || place < places[k];
       float next_place = comes_first ? places[k] : place;
       float next_weight = comes_first ? weights[k] : weight;
-      int next_index = comes_first ? pixels[k] : index;
+      int next_number = comes_first ? steps[k] : number;
       places[k] = comes_first ? place : places[k];
       weights[k] = comes_first ? weight : weights[k];
-      pixels[k] = comes_first ? index : pixels[k];
+      steps[k] = comes_first ? number : steps[k];
       place = next_place;
       weight = next_weight;
-      index = next_index;
+      number = next_number;
     }
   }
-  vec4 prior = vec4(0.0f, 0.0f, 0.0f, 0.0f);
+  vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
+  prior.w = 0.0f;
   if (total > 0.0f) {
     float w = places[0];
     float sum = weights[0];
@@ -87,11 +99,10 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     sum = 0.0f;
     UNROLL for (int i = 0; i < DIRECTIONS; ++i) {
       if (places[i] < w - reach || places[i] > w + reach || (sum > 0.0f && sum >= 0.5f * of_surface)) continue;
-      chosen = pixels[i];
+      chosen = steps[i];
       sum += weights[i];
     }
-    vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(chosen % size.x, chosen / size.x));
-    prior = vec4(plane.x, plane.y, plane.z, 1.0f);
+    prior.w = float(chosen);
   }
   store_prior(CONTEXT REFERENCE, pixel, prior);
 }
@@ -102,7 +113,10 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 FN void adopt_fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   if (prior.w == 0.0f) return;
-  vec3 m = vec3(prior.x, prior.y, prior.z);
+  // Of an accepted pixel, which keeps it.
+  ivec2 place = place_of_step(int(prior.w));
+  vec4 plane = hypothesis_at(CONTEXT REFERENCE, ivec2(pixel.x + place.x, pixel.y + place.y));
+  vec3 m = vec3(plane.x, plane.y, plane.z);
   float cost = min(patch_cost(CONTEXT pixel, m), NO_INFORMATION_COST);
   vec4 checked = check_at(CONTEXT REFERENCE, pixel);
   bool agrees = (PASS.candidates & FILL_WITH_MATCHES) != 0u && checked.y <= PARAMETERS.check_limits.y;

@@ -124,13 +124,15 @@ FN void regress_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 }
 
 // Takes the prior over as the pixel's plane where a source sees its point, whatever it sees of the patch: the cost stays
-// and the measure follows, for another regression or a vote, which need no new one.
+// and the measure follows, for another regression or a vote, which need no new one. The plane that the pixel held so far
+// stays as the prior (m, 0): a vote may give it back.
 FN void adopt_point_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 prior = prior_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
   vec4 ray = ray_at(CONTEXT REFERENCE, pixel);
   vec3 unit_ray = vec3(ray.x, ray.y, ray.z);
   vec3 m = vec3(prior.x, prior.y, prior.z);
+  store_prior(CONTEXT REFERENCE, pixel, vec4(held.x, held.y, held.z, 0.0f));
   if (held.w >= INVALID_COST || prior.w == 0.0f || !in_some_source(CONTEXT unit_ray, m)) return;
   vec4 adopted = vec4(m, held.w);
   store_hypothesis(CONTEXT REFERENCE, pixel, adopted);

@@ -15,6 +15,10 @@
 #define LARGEST_DIFFERENCE 0.08f
 // Mean squared difference, five grey levels squared, that halves the likeness.
 #define HALVING_DIFFERENCE2 4e-4f
+// Displacement (source pixels) from which on the plane that the pixel held before its regression is a rival, and the share
+// of a vote, of a pixel beside and alike, that this one has by itself: thin surfaces may have no such pixels left.
+#define REGRESSED_DISPLACEMENT 0.35f
+#define VOTE_OF_ITS_OWN 0.15f
 // Displacement (source pixels) up to which it does not matter whether a rival is nearer or farther than the pixel's own.
 #define FREE_DISPLACEMENT 0.6f
 // Far beyond it, where the pixel's own plane matches perfectly, (1 - this) / (1 + this) of a nearer rival's votes count.
@@ -120,8 +124,8 @@ FN int checked_source(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, float w, OUT(vec2)
 
 // From 1 down by the mean squared difference of intensity over the middle of the patch, weighted by a tent as those at its
 // rim may lie beyond an edge, in units of the darker image. It must not explain a wrong plane by an exposure of its
-// own, as a correlation of so few pixels could.
-FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 exposure) {
+// own, as a correlation of so few pixels could. `whole`: whether the source sees all of it.
+FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, vec2 exposure, OUT(bool) whole) {
   ViewPair pair = pair_between(CONTEXT REFERENCE, source);
   CameraParameters camera = PARAMETERS.cameras[source];
   // Noise does not count for more where the source is the darker one.
@@ -145,6 +149,8 @@ FN float likeness_of_middle(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
       }
     }
   }
+  float weight_of_row = float((VOTE_MIDDLE_RADIUS + 1) * (VOTE_MIDDLE_RADIUS + 1));
+  whole = n >= weight_of_row * weight_of_row;
   // What is not seen is as unlike as can be.
   if (n == 0.0f) return HALVING_DIFFERENCE2 / (HALVING_DIFFERENCE2 + LARGEST_DIFFERENCE * LARGEST_DIFFERENCE);
   return HALVING_DIFFERENCE2 * n / (HALVING_DIFFERENCE2 * n + sum);
@@ -160,9 +166,10 @@ FN float preference_for_far(float nearer, float cost) {
   return nearer > 0.0f ? (1.0f - handicap) / (1.0f + handicap) : (1.0f + handicap) / (1.0f - handicap);
 }
 
-// Stores as prior (m, 1) the plane, of the pixel's own and its rivals, the candidates that the planes around support
-// most, for which support and likeness in the source speak most; zero where there is none. Planes around are weighted by
-// nearness and likeness of intensity.
+// Stores as prior (m, 1) the plane, of the pixel's own and its rivals, for which support and likeness in the source speak
+// most; zero where there is none. Rivals are the candidates that the planes around support most, and the plane that the
+// pixel held before its regression, which is the prior's until then (m, 0): regressions outvote thin surfaces that the
+// search has found. Planes around are weighted by nearness and likeness of intensity.
 FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   vec4 held = hypothesis_at(CONTEXT REFERENCE, pixel);
@@ -177,6 +184,12 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     // Places along the epipolar curve, in units of VOTE_DISPLACEMENT.
     float scale = PER_VOTE_DISPLACEMENT * speed;
     float own_place = scale * own;
+    vec4 before = prior_at(CONTEXT REFERENCE, pixel);
+    vec3 m_before = vec3(before.x, before.y, before.z);
+    float place_before = scale * dot(m_before, ray);
+    bool regressed = abs(place_before - own_place) * VOTE_DISPLACEMENT > REGRESSED_DISPLACEMENT &&
+                     admissible(CONTEXT ray, m_before);
+    float support_before = VOTE_OF_ITS_OWN;
     float candidates[VOTE_CANDIDATES];
     float support[VOTE_CANDIDATES];
     UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
@@ -208,6 +221,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         float weight = 1.0f / remoteness_of_voter(CONTEXT q, dx, dy, fall_off, intensity, inverse_scale);
         weight = plane.w < INVALID_COST ? weight : 0.0f;
         most += weight * support_between(place, own_place);
+        support_before += weight * support_between(place, place_before);
         UNROLL for (int i = 0; i < VOTE_CANDIDATES; ++i) {
           support[i] += weight * support_between(place, candidates[i]);
         }
@@ -216,8 +230,8 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     prior = vec4(held.x, held.y, held.z, 1.0f);
     // The pixel's own plane comes first.
-    ivec2 standing[1 + VOTE_RIVALS];
-    float votes[1 + VOTE_RIVALS];
+    ivec2 standing[2 + VOTE_RIVALS];
+    float votes[2 + VOTE_RIVALS];
     standing[0] = pixel;
     votes[0] = most;
     int count = 1;
@@ -240,16 +254,27 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
         if (abs(candidates[i] - place) * VOTE_DISPLACEMENT < RIVAL_DISPLACEMENT) support[i] = 0.0f;
       }
     }
+    // The last one, if any, which is no pixel's plane any more.
+    int regressed_at = regressed ? count : -1;
+    if (regressed) {
+      votes[count] = support_before * preference_for_far(VOTE_DISPLACEMENT * (place_before - own_place), held.w);
+      ++count;
+    }
     // Where nothing competes, as on most surfaces, nothing needs to be sampled.
     if (count == 1) count = 0;
+    bool own_is_seen = false;
     float best = 0.0f;
     vec2 exposure = vec2(1.0f, 0.0f);
     if (count > 0) exposure = exposure_around(CONTEXT source, pixel);
     for (int k = 0; k < count; ++k) {
-      vec4 plane = hypothesis_at(CONTEXT REFERENCE, standing[k]);
+      bool is_before = k == regressed_at;
+      // At the image's rim it may be whatever lies farther inside.
+      if (votes[k] <= best || (is_before && !own_is_seen)) continue;
+      vec4 plane = is_before ? before : hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
-      if (votes[k] <= best) continue;
-      float likeness = likeness_of_middle(CONTEXT source, pixel, m, exposure);
+      bool whole;
+      float likeness = likeness_of_middle(CONTEXT source, pixel, m, exposure, whole);
+      if (k == 0) own_is_seen = whole;
       // Of thin surfaces there are fewer pixels around than of what is behind them: what the images show must outweigh that.
       float score = votes[k] * (likeness * likeness * likeness);
       if (score > best) {

@@ -169,13 +169,13 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
     case Kernel::adopt:
       return {prior | plane | seen, texels, plane};
     case Kernel::adopt_point:
-      return {prior | plane | ray | checks, 0, plane | checks};
+      return {prior | plane | ray | checks, 0, prior | plane | checks};
     case Kernel::fill:
-      return {seen | plane | checks, 0, prior};
+      return {seen | plane | checks | prior, 0, prior};
     case Kernel::adopt_fill:
-      return {prior | checks | seen, texels, plane | checks};
+      return {prior | plane | checks | seen, texels, plane | checks};
     case Kernel::vote:
-      return {seen | plane | checks, texels, prior};
+      return {seen | plane | checks | prior, texels, prior};
     case Kernel::transfer_keep:
       return {ray | winner | plane, 0, prior};
     case Kernel::renew_point:

@@ -632,7 +632,11 @@ class FillOfAPixel : public ::testing::Test {
   /// The multiple that the pixel would take over; 0 where there is none.
   float filled() {
     kernel::cpu::fill_pixel(views_.fixture.context(), {x, y});
-    return views_.fixture.view(0).priors(y, x)[2] / m_.z;
+    const ViewMemory& view = views_.fixture.view(0);
+    const auto number = static_cast<int>(view.priors(y, x)[3]);
+    if (number == 0) return 0;
+    const ivec2 place = kernel::cpu::place_of_step(number);
+    return view.hypotheses(y + place.y, x + place.x)[2] / m_.z;
   }
 
   using ViewMemory = kernel::cpu::ViewMemory;
@@ -676,6 +680,27 @@ TEST_F(FillOfAPixel, TakesNoPlaneThatIsOutOfRange) {
   EXPECT_FLOAT_EQ(filled(), 3);
 }
 
+constexpr int to_the_right = 5;  // of the directions, row by row
+
+TEST(Fill, NumbersStepsOfAllDirections) {
+  for (int direction = 0; direction < 9; ++direction) {
+    for (const int step : {1, 2, 9999, 10000}) {
+      const int number = kernel::cpu::numbered_step(direction, step);
+      EXPECT_GT(number, 0);
+      const ivec2 place = kernel::cpu::place_of_step(static_cast<int>(static_cast<float>(number)));
+      EXPECT_EQ(place.x, step * (direction % 3 - 1)) << direction;
+      EXPECT_EQ(place.y, step * (direction / 3 - 1)) << direction;
+    }
+  }
+}
+
+/// The plane of the pixel on the right, as fill_pixel() does.
+void offer(kernel::cpu::ViewMemory& view, ivec2 pixel, vec3 m) {
+  view.hypotheses(pixel.y, pixel.x + 1) = cv::Vec4f(m.x, m.y, m.z, 0.1f);
+  const auto number = static_cast<float>(kernel::cpu::numbered_step(to_the_right, 1));
+  view.priors(pixel.y, pixel.x) = cv::Vec4f(0, 0, 0, number);
+}
+
 TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
   Options options = wide_range();
   AgreeingViews views(options);
@@ -684,7 +709,7 @@ TEST(Fill, WithMatchesLeavesPixelsThatAgreeWithTheSourceAndMatchBetter) {
   const vec3 m = views.plane(0);
   const auto is_filled = [&](unsigned how, float cost, float displacement) {
     fixture.view(0).hypotheses(pixel.y, pixel.x) = cv::Vec4f(2 * m.x, 2 * m.y, 2 * m.z, cost);
-    fixture.view(0).priors(pixel.y, pixel.x) = cv::Vec4f(m.x, m.y, m.z, 1);
+    offer(fixture.view(0), pixel, m);
     fixture.view(0).checks(pixel.y, pixel.x) =
         cv::Vec4f(0.1f, displacement, 0.5f, REASON_INCONSISTENT);
     fixture.pass().candidates = how;
@@ -710,7 +735,7 @@ TEST(Fill, ReachesTheRightPixelsOfImagesThatAreNotSquare) {
   fixture.pass().radius = 10;
   fixture.pass().candidates = REASON_NO_RAY;
   kernel::cpu::fill_pixel(fixture.context(), {48, 36});
-  EXPECT_EQ(fixture.view(0).priors(36, 48)[2], 0.5f);
+  EXPECT_EQ(fixture.view(0).priors(36, 48)[3], kernel::cpu::numbered_step(3, 3)) << "to the left";
 }
 
 TEST(Fill, WithMatchesMayMatchALittleWorse) {
@@ -723,7 +748,7 @@ TEST(Fill, WithMatchesMayMatchALittleWorse) {
   for (const auto& [better, is_filled] : {std::pair(0.08f, true), {0.12f, false}}) {
     fixture.view(0).hypotheses(48, 48) =
         cv::Vec4f(2 * offered.x, 2 * offered.y, 2 * offered.z, cost - better);
-    fixture.view(0).priors(48, 48) = cv::Vec4f(offered.x, offered.y, offered.z, 1);
+    offer(fixture.view(0), {48, 48}, offered);
     fixture.view(0).checks(48, 48) = cv::Vec4f(0.1f, 0.5f, 0.5f, REASON_INCONSISTENT);
     kernel::cpu::adopt_fill_pixel(fixture.context(), {48, 48});
     EXPECT_EQ(fixture.view(0).hypotheses(48, 48)[2] == offered.z, is_filled) << better;

@@ -305,6 +305,7 @@ TEST_F(Regression, IsTakenOverWithoutACostOnlyWhereASourceSeesThePoint) {
   EXPECT_FLOAT_EQ(fixture_.view(0).checks(pixel.y, pixel.x)[2],
                   static_cast<float>(0.6 * ray(pixel).z()))
       << "the measure follows";
+  EXPECT_EQ(fixture_.view(0).priors(pixel.y, pixel.x), cv::Vec4f(0, 0, 0.5f, 0)) << "for the vote";
   fixture_.schedule().parameters.cameras[1].size.x = 1;
   EXPECT_EQ(adopted(), held);
 }

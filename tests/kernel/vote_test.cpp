@@ -39,8 +39,9 @@ class Vote : public ::testing::Test {
 
   /// m.z of the plane elected at a column of the middle row; 0 where there is none.
   float elected(int x, int y = size / 2) {
+    cv::Vec4f& prior = fixture_.view(0).priors(y, x);
+    prior = cv::Vec4f::all(0);
     kernel::cpu::vote_pixel(fixture_.context(), ivec2(x, y));
-    const cv::Vec4f prior = fixture_.view(0).priors(y, x);
     return prior[3] == 1 ? prior[2] : 0;
   }
 
@@ -115,9 +116,10 @@ TEST_F(Vote, NearPlanesCountForMoreThanMoreOfThemFarAway) {
 }
 
 TEST_F(Vote, WhatIsNotSeenIsAsUnlikeAsCanBe) {
+  bool whole = false;
   const auto likeness = [&](float plane, kernel::vec2 exposure) {
-    return kernel::cpu::likeness_of_middle(fixture_.context(), 1, {48, 48}, {0, 0, plane},
-                                           exposure);
+    return kernel::cpu::likeness_of_middle(fixture_.context(), 1, {48, 48}, {0, 0, plane}, exposure,
+                                           whole);
   };
   for (const auto& [reference, source, exposure] : {std::tuple(0.4f, 0.38f, kernel::vec2(1, 0)),
                                                     {0.8f, 0.38f, kernel::vec2(2, 0)},
@@ -130,9 +132,11 @@ TEST_F(Vote, WhatIsNotSeenIsAsUnlikeAsCanBe) {
   fixture_.view(1).image().setTo(0);
   fixture_.interpolate();
   const float least = likeness(far_plane, {1, 0});
+  EXPECT_TRUE(whole);
   fixture_.view(1).image().setTo(MASKED_INTENSITY);
   fixture_.interpolate();
   EXPECT_FLOAT_EQ(likeness(far_plane, {1, 0}), least);
+  EXPECT_FALSE(whole);
 }
 
 TEST_F(Vote, ElectsNoPlaneThatIsOutOfRange) {
@@ -195,6 +199,67 @@ TEST(VoteOnATexturedWall, WhatPassedTheChecksTellsHowExposuresDiffer) {
   for (const float exposure : {0.6f, 1.0f, 1.2f}) {
     EXPECT_GT(share_that_elects_the_wall(exposure, true), 0.75) << exposure;
   }
+}
+
+/// The wall, which the search had found, was outvoted everywhere by a plane twice as near.
+class VoteAfterARegression : public ::testing::Test {
+ protected:
+  VoteAfterARegression() : fixture_(fisheye_rig(size), wide_range("fast")) {
+    const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
+    fixture_.show(render_plane(fixture_.rig(), normal, 2), 1);
+    fixture_.set_reference(0);
+    fixture_.pass().radius = 10;
+    wall_ = (normal / 2).cast<float>();
+    fixture_.view(0).hypotheses.setTo(cv::Scalar(2 * wall_.x(), 2 * wall_.y(), 2 * wall_.z(), 0.2));
+  }
+
+  /// Of the pixels in the middle, which held this multiple of the wall's plane before, the share
+  /// that elects that.
+  double share_that_goes_back(float multiple) {
+    const Eigen::Vector3f before = multiple * wall_;
+    int elected = 0;
+    for (int y = first; y < last; ++y) {
+      for (int x = first; x < last; ++x) {
+        cv::Vec4f& prior = fixture_.view(0).priors(y, x);
+        prior = cv::Vec4f(before.x(), before.y(), before.z(), 0);
+        kernel::cpu::vote_pixel(fixture_.context(), ivec2(x, y));
+        elected += prior[2] == before.z() ? 1 : 0;
+      }
+    }
+    return static_cast<double>(elected) / ((last - first) * (last - first));
+  }
+
+  static constexpr int first = 20;
+  static constexpr int last = size - first;
+  KernelFixture fixture_;
+  Eigen::Vector3f wall_;
+};
+
+TEST_F(VoteAfterARegression, GoesBackWhereTheSourceShowsIt) {
+  EXPECT_GT(share_that_goes_back(1), 0.5);
+  EXPECT_LT(share_that_goes_back(3), 0.05) << "which the source does not show";
+}
+
+/// As at the rim of its image, farther inside of which anything may look more alike.
+TEST_F(VoteAfterARegression, StaysWhereTheSourceDoesNotSeeAllOfTheNewPlane) {
+  const ivec2 pixel(48, 48);
+  const Eigen::Vector3f near = 8 * wall_;  // ten pixels away in the source
+  fixture_.view(0).hypotheses.setTo(cv::Scalar(near.x(), near.y(), near.z(), 0.2));
+  const auto goes_back = [&] {
+    fixture_.view(0).priors(pixel.y, pixel.x) = cv::Vec4f(wall_.x(), wall_.y(), wall_.z(), 0);
+    kernel::cpu::vote_pixel(fixture_.context(), pixel);
+    return fixture_.view(0).priors(pixel.y, pixel.x)[2] == wall_.z();
+  };
+  EXPECT_TRUE(goes_back());
+  const kernel::vec3 ray = to_kernel(fixture_.view(0).rays(pixel.y, pixel.x));
+  kernel::vec2 place;
+  ASSERT_TRUE(kernel::cpu::position_in_source(
+      fixture_.context(), 1, ray, ray.x * near.x() + ray.y * near.y() + ray.z * near.z(), place));
+  // What lies above: the pixel in which the point lands stays seen.
+  const cv::Rect above(static_cast<int>(place.x) - 1, static_cast<int>(place.y) - 1, 4, 2);
+  fixture_.view(1).image()(above).setTo(MASKED_INTENSITY);
+  fixture_.interpolate();
+  EXPECT_FALSE(goes_back());
 }
 
 /// A veil of light, a black level or a tone curve of one camera adds to what it shows.
