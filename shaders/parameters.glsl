@@ -21,11 +21,13 @@
 
 // In a vote, the planes that stand for election besides the pixel's own (of pixels in eight directions, at half the
 // radius and at it), the steps between the pixels that vote in a row and between their rows, the planes that then compete
-// with the pixel's own, and the radius of the part of the patch that compares them.
+// with the pixel's own, all that are compared (its own, these and the one it held before its regression), and the radius of
+// the part of the patch that compares them.
 #define VOTE_CANDIDATES 16
 #define VOTE_STEP 4
 #define VOTE_ROW_STEP 3
 #define VOTE_RIVALS 2
+#define VOTE_COMPARED (2 + VOTE_RIVALS)
 #define VOTE_MIDDLE_RADIUS 1
 
 // The grid of the pixels that vote on a normal.

@@ -230,8 +230,8 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     }
     prior = vec4(held.x, held.y, held.z, 1.0f);
     // The pixel's own plane comes first.
-    ivec2 standing[2 + VOTE_RIVALS];
-    float votes[2 + VOTE_RIVALS];
+    ivec2 standing[VOTE_COMPARED];
+    float votes[VOTE_COMPARED];
     standing[0] = pixel;
     votes[0] = most;
     int count = 1;

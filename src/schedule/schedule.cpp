@@ -541,10 +541,9 @@ class Builder {
     kernel::PassParameters pass = pass_of(views_of(0));
     pass.iteration = regressions_;
     pass.radius = options_.vote_radius;
-    // Those of the pixel's own plane and of its rivals, in the source that tells most.
-    add_with_samples(
-        Kernel::vote, pass, views_of(0),
-        (1 + VOTE_RIVALS) * kernel::samples_of_patch(VOTE_MIDDLE_RADIUS, PATTERN_DENSE));
+    // In the source that tells most.
+    add_with_samples(Kernel::vote, pass, views_of(0),
+                     VOTE_COMPARED * kernel::samples_of_patch(VOTE_MIDDLE_RADIUS, PATTERN_DENSE));
     adopt_voted();
   }
 
