@@ -49,11 +49,11 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     int reach = dx == 0 || dy == 0 ? PASS.radius : PASS.radius * 7 / 10;
     // The nearest accepted one first, what is done with it after the loop: software devices would do it every step.
     ivec2 q = pixel;
-    int number = 0;
+    int step = 0;
     bool accepted = false;
     for (int k = 1; k <= reach && !accepted; ++k) {
       q = ivec2(pixel.x + k * dx, pixel.y + k * dy);
-      number = numbered_step(i, k);
+      step = k;
       if (!in_image(size, q)) break;
       accepted = check_at(CONTEXT REFERENCE, q).w == 0.0f;
     }
@@ -64,6 +64,7 @@ FN void fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     float place = dot(m, ray);
     float weight =
         1.0f / eighth_power(root_of_unlikeness(intensity_at(CONTEXT REFERENCE, q) - intensity, inverse_scale));
+    int number = numbered_step(i, step);
     total += weight;
     // All from its place on move on by one, so that of equal ones the first found stays first.
     bool comes_first = false;

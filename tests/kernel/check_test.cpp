@@ -736,6 +736,8 @@ TEST(Fill, ReachesTheRightPixelsOfImagesThatAreNotSquare) {
   fixture.pass().candidates = REASON_NO_RAY;
   kernel::cpu::fill_pixel(fixture.context(), {48, 36});
   EXPECT_EQ(fixture.view(0).priors(36, 48)[3], kernel::cpu::numbered_step(3, 3)) << "to the left";
+  kernel::cpu::adopt_fill_pixel(fixture.context(), {48, 36});
+  EXPECT_EQ(fixture.view(0).hypotheses(36, 48)[2], 0.5f);
 }
 
 TEST(Fill, WithMatchesMayMatchALittleWorse) {
