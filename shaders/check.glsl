@@ -290,12 +290,13 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 }
 
 // Stores what a vote asks for: the source that tells most (agreeing_source()), the displacement, what that source shows of
-// the point, and the reasons.
+// the point, and the reasons, of which an image that contradicts the plane is one, whatever cost is accepted.
 FN void check_for_vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   Comparison c;
   float source = 0.0f;
   float intensity = MASKED_INTENSITY;
   if (compare_with_others(CONTEXT pixel, c)) {
+    if (c.held.w > NO_INFORMATION_COST) c.reasons |= REASON_HIGH_COST;
     vec2 velocity;
     int agreeing = agreeing_source(CONTEXT pixel, c.ray, vec3(c.held.x, c.held.y, c.held.z), velocity);
     source = float(agreeing);

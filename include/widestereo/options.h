@@ -159,7 +159,9 @@ struct Options {
   /// Left-right check: largest relative difference of distance, 0..999.
   double consistency_relative = 0.02;
   double consistency_pixels = 1.0;  ///< left-right check: largest displacement, pixels, 0..999
-  double max_cost = 0.5;            ///< largest 1 - ZNCC accepted, 0..2
+  /// Largest 1 - ZNCC accepted, 0..2. Noise on blank walls matches badly though the plane is right,
+  /// which min_confidence knows: `fast` and `quality` accept any cost.
+  double max_cost = 0.5;
   /// Pixels between min_distance and max_distance in the source view, 0..10000.
   double min_parallax = 0.5;
   double max_tilt = 85;  ///< degrees between normal and viewing ray, 0..90; the search keeps to it
@@ -167,7 +169,7 @@ struct Options {
   /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;
   /// Smallest ViewResult::confidence accepted, 0..1: what is more likely wrong than right is
-  /// rejected.
+  /// rejected; `fast` and `quality` ask for 0.7.
   double min_confidence = 0.5;
   /// Reject where a place 2, 4 or 8 source pixels away costs less by more than this, 0..2; 0 = not
   /// checked.

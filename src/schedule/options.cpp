@@ -49,7 +49,9 @@ Options Options::preset_named(const std::string& name) {
   options.window_radius = 3;
   options.interpolation = Interpolation::cubic;
   options.min_texture = 0;
-  options.max_cost = 0.8;
+  // What matches badly is judged by its confidence, which knows noise.
+  options.max_cost = 2;
+  options.min_confidence = 0.7;
   options.far_preference = 0.08;
   options.max_gain = 20;
   options.warm_iterations = 1;

@@ -271,6 +271,21 @@ TEST(Checks, ForAVoteTellWhatTheSourceShowsOfThePoint) {
   }
 }
 
+TEST(Checks, ForAVoteRepairWhatTheImagesContradictWhateverCostIsAccepted) {
+  Options options = wide_range();
+  const auto reasons_at_cost = [&options](float cost) {
+    AgreeingViews views(options);
+    views.fixture.view(0).hypotheses(48, 48)[3] = cost;
+    kernel::cpu::check_for_vote_pixel(views.fixture.context(), ivec2(48, 48));
+    return static_cast<int>(views.fixture.view(0).checks(48, 48)[3]);
+  };
+  options.max_cost = 2;
+  EXPECT_EQ(reasons_at_cost(0.99f), 0);
+  EXPECT_EQ(reasons_at_cost(1.01f), REASON_HIGH_COST);
+  options.max_cost = 0.5;
+  EXPECT_EQ(reasons_at_cost(0.6f), REASON_HIGH_COST);
+}
+
 TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {
   AgreeingViews views(wide_range());
   EXPECT_EQ(views.reasons({48, 48}) & REASON_SPECKLE, 0);
