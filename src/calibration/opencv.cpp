@@ -93,12 +93,18 @@ class Storage {
     return keys;
   }
 
+  /// What the file calls a key that is named as if its numbers begin with 1.
+  std::string key_of(const char* named) const {
+    std::string key = named;
+    if (begins_with_0_ && key.back() >= '1' && key.back() <= '3') --key.back();
+    return key;
+  }
+
   /// The first of the keys that holds a numeric matrix (or a list, or a number), as double; empty
   /// if none does.
   cv::Mat matrix(Keys keys) const {
     for (const char* const named : keys) {
-      std::string key = named;
-      if (begins_with_0_ && key.back() >= '1' && key.back() <= '3') --key.back();
+      const std::string key = key_of(named);
       const cv::FileNode node = node_of(key);
       cv::Mat value = numbers(node);
       if (node.isMap()) {
@@ -256,16 +262,20 @@ void require_zero(const Document& document, const std::string& what, std::span<c
 
 /// A camera of cv::omnidir whose xi is overlooked would be taken for one of cv::fisheye.
 void require_known_xi(const Document& document, const Storage& storage) {
-  const auto is_one_of = [](Keys keys, const std::string& key) {
-    return std::find(keys.begin(), keys.end(), key) != keys.end();
+  const auto holds_number = [&storage](const std::string& key) {
+    for (const Keys keys : {first_xi, second_xi}) {
+      for (const char* const named : keys) {
+        if (storage.key_of(named) == key) return storage.matrix({named}).total() == 1;
+      }
+    }
+    return false;
   };
   for (const std::string& key : storage.keys()) {
     const std::string start = key.substr(0, 2);
     if (start != "xi" && start != "Xi" && start != "XI") continue;
-    const bool is_known = is_one_of(first_xi, key) || is_one_of(second_xi, key);
-    if (is_known && storage.matrix({key.c_str()}).total() == 1) continue;
-    document.fail("The xi of a camera must be a number by the name xi, xi1 or xi2; correct " + key +
-                  ".");
+    if (holds_number(key)) continue;
+    document.fail("The xi of a camera must be a number by the name xi, " + storage.key_of("xi1") +
+                  " or " + storage.key_of("xi2") + "; correct " + key + ".");
   }
 }
 

@@ -653,6 +653,20 @@ TEST(OpenCv, ReadsMatricesWithinOneMap) {
             std::string::npos);
 }
 
+TEST_F(OmnidirSamples, NumberedFromZeroAreRead) {
+  const Rig rig = read_calibration(write([](cv::FileStorage& file) {
+                                     write_camera(file, "_0", 1.3);
+                                     write_camera(file, "_1", 1.4);
+                                     file << "R" << cv::Mat::eye(3, 3, CV_64F) << "T"
+                                          << cv::Vec3d(-0.2, 0, 0);
+                                   }),
+                                   size_)
+                      .rig;
+  ASSERT_EQ(rig.views.size(), 2u);
+  expect_camera(rig.views[0].camera, 1.3);
+  expect_camera(rig.views[1].camera, 1.4);
+}
+
 /// The camera would be taken for one of cv::fisheye.
 TEST_F(OmnidirSamples, NoXiIsOverlooked) {
   const auto error_with = [&](const std::string& line) {
