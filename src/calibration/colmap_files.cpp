@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <fstream>
+#include <limits>
 #include <locale>
 #include <span>
 #include <sstream>
@@ -117,7 +118,9 @@ class BinaryFile {
     return name;
   }
 
-  void skip(std::uint64_t bytes) {
+  void skip(std::uint64_t count, std::size_t bytes_of_each = 1) {
+    require(count <= std::numeric_limits<std::uint64_t>::max() / bytes_of_each);
+    const std::uint64_t bytes = count * bytes_of_each;
     file_.ignore(static_cast<std::streamsize>(bytes));
     require(file_.good() && static_cast<std::uint64_t>(file_.gcount()) == bytes);
   }
@@ -233,7 +236,7 @@ void read_points(BinaryFile file, const OnPoint& visit) {
     Eigen::Vector3d position;
     file.read_bytes(position.data(), 3 * sizeof(double));
     file.skip(3 + sizeof(double));  // colour, error
-    file.skip(file.read<std::uint64_t>() * 2 * sizeof(std::uint32_t));
+    file.skip(file.read<std::uint64_t>(), 2 * sizeof(std::uint32_t));
     visit(id, position);
   }
 }

@@ -385,6 +385,11 @@ TEST_F(Colmap, ReadsBinaryPoints) {
   EXPECT_DOUBLE_EQ(range->farthest, 5);
   folder_.write("points3D.bin", points.substr(0, points.size() - 1));
   EXPECT_NE(error({"b.png"}).find("points3D.bin ends too early"), std::string::npos);
+  // A track of so many images that its bytes are none in 64 bits.
+  const std::string last_track = bytes(std::uint64_t{19}) + std::string(8 * 19, '\1');
+  folder_.write("points3D.bin", points.substr(0, points.size() - last_track.size()) +
+                                    bytes(std::uint64_t{1} << 61));
+  EXPECT_NE(error({"b.png"}).find("points3D.bin ends too early"), std::string::npos);
 }
 
 TEST_F(Colmap, PointsWithoutAFinitePositionTellNothing) {
