@@ -228,14 +228,16 @@ class Reconstruction {
   /// Results of an earlier run that came of the same images, cameras, poses, masks and ranges.
   void keep_results() {
     matched_.resize(images_.views.size());
-    std::map<std::string, std::pair<std::size_t, Json>> wanted;
+    // With the inputs of every group that has the image, as any of them may have matched it.
+    std::map<std::string, std::pair<std::size_t, std::vector<Json>>> wanted;
     for (std::size_t i = 0; i < groups_.size(); ++i) {
       const Json inputs = inputs_of(i);
       for (const std::size_t image : groups_[i]) {
         const std::string& name = images_.views[image].name;
         folders_.require_usable(name);
         folders_.require_free(name);
-        wanted.emplace(name, std::pair{image, inputs});
+        const auto [entry, is_new] = wanted.try_emplace(name, image, std::vector<Json>());
+        entry->second.second.push_back(inputs);
       }
     }
     Json kept = Json::array();
@@ -246,11 +248,16 @@ class Reconstruction {
         ++not_given;
         continue;
       }
-      Json of_inputs = result;
-      of_inputs.update(image->second.second);
-      if (of_inputs != result || !folders_.is_there(result)) continue;
+      const auto& [number, inputs_of_groups] = image->second;
+      const bool is_of_same = std::any_of(inputs_of_groups.begin(), inputs_of_groups.end(),
+                                          [&result](const Json& inputs) {
+                                            Json of_inputs = result;
+                                            of_inputs.update(inputs);
+                                            return of_inputs == result;
+                                          });
+      if (!is_of_same || !folders_.is_there(result)) continue;
       kept.push_back(result);
-      matched_[image->second.first] = true;
+      matched_[number] = true;
     }
     folders_.keep(kept);
     if (not_given > 0) {

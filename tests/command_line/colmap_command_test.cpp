@@ -253,6 +253,33 @@ TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
   ASSERT_EQ(run(reconstruct() + "--max-cost 0.3 --overwrite").exit_code, 0);
 }
 
+/// Its first group sees nothing in common, so that it is matched in its second one.
+TEST_F(ReconstructCommand, KeepsAnImageOfTwoGroupsWhicheverMatchedIt) {
+  const std::string images = bytes_of("model/images.txt");
+  const std::size_t first = images.find("1 1 0 0 0 0 0 0 1 left.png\n");
+  ASSERT_NE(first, std::string::npos);
+  const std::size_t observations = images.find('\n', first) + 1;
+  folder_.write("model/images.txt",
+                images + "4 1 0 0 0 0.02 0 0 1 a.png\n" +
+                    images.substr(observations, images.find('\n', observations) - observations) +
+                    "\n");
+  cv::Mat turned;
+  cv::flip(cv::imread(file("left.png")), turned, 0);
+  cv::imwrite(file("images/a.png"), turned);
+  std::filesystem::create_directories(folder_ / "masks");
+  cv::imwrite(file("masks/a.png.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  const std::string command = reconstruct() + "--sources 1 --masks " + file("masks");
+  const Outcome outcome = run(command);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  ASSERT_NE(outcome.output.find("a.png and 1 more see nothing in common"), std::string::npos)
+      << outcome.output;
+  const std::string left = bytes_of("out/left.png/result.json");
+  const std::string right = bytes_of("out/right/1.png/result.json");
+  ASSERT_EQ(run(command).exit_code, 0);
+  EXPECT_TRUE(bytes_of("out/left.png/result.json") == left);  // with the time it took
+  EXPECT_TRUE(bytes_of("out/right/1.png/result.json") == right);
+}
+
 TEST_F(ReconstructCommand, DamagedMapsOfAnEarlierRunAreNamedWithTheRemedy) {
   ASSERT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
   folder_.write("out/right/1.png/normals0.tiff", "");
