@@ -269,7 +269,7 @@ FN void vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
     for (int k = 0; k < count; ++k) {
       bool is_before = k == regressed_at;
       // At the image's rim it may be whatever lies farther inside.
-      if (votes[k] <= best || (is_before && !own_is_seen)) continue;
+      if ((k > 0 && votes[k] <= best) || (is_before && !own_is_seen)) continue;
       vec4 plane = is_before ? before : hypothesis_at(CONTEXT REFERENCE, standing[k]);
       vec3 m = vec3(plane.x, plane.y, plane.z);
       bool whole;

@@ -240,6 +240,21 @@ TEST_F(VoteAfterARegression, GoesBackWhereTheSourceShowsIt) {
   EXPECT_LT(share_that_goes_back(3), 0.05) << "which the source does not show";
 }
 
+/// Those around are no votes for a plane that one pixel alone holds, as a thin surface's.
+TEST_F(VoteAfterARegression, GoesBackFromAPlaneThatNoPixelAroundHolds) {
+  const Eigen::Vector3f around = 6 * wall_;
+  const Eigen::Vector3f own = 2 * wall_;
+  int elected = 0;
+  for (int x = first; x < last; ++x) {
+    fixture_.view(0).hypotheses.setTo(cv::Scalar(around.x(), around.y(), around.z(), 0.2));
+    fixture_.view(0).hypotheses(size / 2, x) = cv::Vec4f(own.x(), own.y(), own.z(), 0.2f);
+    fixture_.view(0).priors(size / 2, x) = cv::Vec4f(wall_.x(), wall_.y(), wall_.z(), 0);
+    kernel::cpu::vote_pixel(fixture_.context(), ivec2(x, size / 2));
+    elected += fixture_.view(0).priors(size / 2, x)[2] == wall_.z() ? 1 : 0;
+  }
+  EXPECT_GT(elected, 0.5 * (last - first));
+}
+
 /// As at the rim of its image, farther inside of which anything may look more alike.
 TEST_F(VoteAfterARegression, StaysWhereTheSourceDoesNotSeeAllOfTheNewPlane) {
   const ivec2 pixel(48, 48);
