@@ -491,11 +491,11 @@ class Builder {
 
   void measure(Views views) { add(Kernel::measure, pass_of(views), views, 0); }
 
-  /// In the source that tells most. `how`: see shaders/subpixel.glsl.
+  /// In all sources at most. `how`: see shaders/subpixel.glsl.
   void match_subpixel(Views views, unsigned how = 0) {
     kernel::PassParameters pass = pass_of(views);
     pass.candidates = how;
-    add_with_patches(Kernel::subpixel, pass, views, 1);
+    add(Kernel::subpixel, pass, views, 1);
   }
 
   /// Planes that were regressed in the frame before need fewer neighbours.

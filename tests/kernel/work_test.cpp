@@ -219,7 +219,7 @@ TEST(Work, OfAScheduleAddsUp) {
   }
 }
 
-TEST(Work, OfASubPixelMatchIsAPatchInOneSource) {
+TEST(Work, OfASubPixelMatchIsAPatchInEachSource) {
   Rig rig = fisheye_rig(64);
   rig.views.push_back(rig.views[1]);
   rig.views[2].world_from_camera.translation().y() += 0.1;
@@ -229,7 +229,7 @@ TEST(Work, OfASubPixelMatchIsAPatchInOneSource) {
   int matches = 0;
   for (const Dispatch& dispatch : schedule.dispatches) {
     if (dispatch.kernel == Kernel::subpixel) {
-      EXPECT_EQ(dispatch.samples, dispatch.pixels * samples);
+      EXPECT_EQ(dispatch.samples, 2 * dispatch.pixels * samples);
       matches += dispatch.views;
     }
     if (dispatch.kernel == Kernel::sweep) {
