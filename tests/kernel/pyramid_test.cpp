@@ -2,8 +2,6 @@
 // Between the levels of the image pyramid: intensities, cameras and planes.
 #include <gtest/gtest.h>
 
-#include <set>
-
 #include "kernel_fixture.h"
 
 namespace widestereo::test {
