@@ -54,14 +54,14 @@ cv::Mat read_map(const std::string& file, int values, const std::string& what,
   return map;
 }
 
-/// Which view the map is of, as its name says where it is one of ours and the set has such a view;
-/// 0 otherwise.
+/// Which view the map is of, as its name says where it is one of ours and the set, if there is one,
+/// has such a view; 0 otherwise.
 int view_in_name(const fs::path& map, const fs::path& set) {
   const std::string stem = map.stem().string();
   for (const std::string name : {"distance_accepted", "distance"}) {
     if (!stem.starts_with(name)) continue;
     const std::optional<double> view = ws::number_of(stem.substr(name.size()));
-    if (view && fs::exists(set / ("depth" + stem.substr(name.size()) + ".tiff"))) {
+    if (view && (set.empty() || fs::exists(set / ("depth" + stem.substr(name.size()) + ".tiff")))) {
       return static_cast<int>(*view);
     }
   }
@@ -90,20 +90,22 @@ std::optional<int> camera_in_record(const fs::path& map, cv::Size size, int view
 
 /// `size`: of the map.
 void choose_views(EvaluateArguments& a, cv::Size size) {
-  if (a.view_of_map) {
-    a.view = *a.view_of_map;
-  } else if (!a.set.empty()) {
+  const auto by_record_or_name = [&] {
     const int in_name = view_in_name(a.prediction, a.set);
     const auto in_record = camera_in_record(
         a.prediction, size, in_name,
         a.calibration.empty() ? fs::path(a.set) / calibration_of_set : fs::path(a.calibration));
-    a.view = in_record.value_or(in_name);
-    if (a.view != 0 || in_name != 0) {
-      say(a.prediction + " is scored as of view " + std::to_string(a.view) +
-          (a.view == in_name ? ", by its name" : ", by the record beside it") +
+    // Without a set to say so, a number in a name may be anything.
+    if (a.set.empty() && !in_record) return 0;
+    const int view = in_record.value_or(in_name);
+    if (view != 0 || in_name != 0) {
+      say(a.prediction + " is scored as of view " + std::to_string(view) +
+          (view == in_name ? ", by its name" : ", by the record beside it") +
           "; --view chooses another.");
     }
-  }
+    return view;
+  };
+  a.view = a.view_of_map ? *a.view_of_map : by_record_or_name();
   a.source = a.source_of_map.value_or(a.view == 0 ? 1 : 0);
 }
 
@@ -148,7 +150,8 @@ void run_evaluate(EvaluateArguments a) {
   if (!a.valid.empty()) truth.valid = read_labels(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = read_map(a.truth_normals, 3, "a normal map");
-  if (!a.image.empty()) truth.image = ws::read_grey_levels(a.image);
+  if (!a.image.empty())
+    truth.image = ws::to_stretched_grey_levels(ws::read_image(a.image), a.image);
   if (!a.normals.empty() && a.truth_normals.empty()) {
     throw ws::Error("--normals needs --truth-normals, or a folder with them by --set.");
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "progress_bar.h"
 #include "result_folders.h"
@@ -66,12 +67,26 @@ void require_no_validation_messages(const ws::Device& device) {
 }
 
 bool is_blank(const cv::Mat& image, const cv::Mat& mask) {
-  constexpr double noise = 4;  // grey levels, of black pixels
+  constexpr double noise = 4 / 255.0;  // of black pixels
+  constexpr double share_in_means = 0.35;
+  constexpr int side = 9;
+  cv::Mat intensity = ws::to_intensity(image, "The image");
   double darkest = 0;
   double brightest = 0;
-  cv::minMaxLoc(ws::to_grey_levels(image, "The image"), &darkest, &brightest, nullptr, nullptr,
-                mask);
-  return brightest - darkest <= noise;
+  cv::minMaxLoc(intensity, &darkest, &brightest, nullptr, nullptr, mask);
+  if (brightest - darkest > noise) return false;
+  // Of cameras with fewer bits than their files no image differs by more, but not from pixel to
+  // pixel alone.
+  const auto mean_and_deviation = [&] {
+    cv::Scalar mean;
+    cv::Scalar deviation;
+    cv::meanStdDev(intensity, mean, deviation, mask);
+    return std::pair(mean[0], deviation[0]);
+  };
+  const auto [mean, deviation] = mean_and_deviation();
+  if (!mask.empty()) intensity.setTo(mean, mask == 0);
+  cv::blur(intensity, intensity, {side, side});
+  return mean_and_deviation().second <= share_in_means * deviation;
 }
 
 std::string same_pictures(const ws::Rig& rig, const std::vector<cv::Mat>& images) {

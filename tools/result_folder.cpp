@@ -150,9 +150,11 @@ class ViewWriter {
 
  private:
   cv::Mat textured_pixels() const {
-    return ws::textured_pixels(
-        ws::to_grey_levels(contents_.images[index_], "The image of " + view_.name),
-        (result_.reasons & ws::reason_no_ray) == 0);
+    // As it was matched.
+    cv::Mat grey;
+    ws::to_intensity(contents_.images[index_], "The image of " + view_.name)
+        .convertTo(grey, CV_8U, 255 * result_.gain);
+    return ws::textured_pixels(grey, (result_.reasons & ws::reason_no_ray) == 0);
   }
 
   fs::path named(const std::string& what, const std::string& extension) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "rig_settings.h"
 
+#include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
 
@@ -20,6 +21,24 @@ namespace {
 bool is_of_one_camera(const ws::Calibration& calibration) {
   return calibration.files.size() == 1 && (calibration.format == ws::CalibrationFormat::euroc ||
                                            calibration.format == ws::CalibrationFormat::ros);
+}
+
+/// Whether a mask leaves out most of what lies farther off the axis, so that it knows the rim: one
+/// may be of a vehicle's bonnet alone.
+bool mask_leaves_out(const ws::View& view, double theta) {
+  if (view.mask.empty()) return false;
+  const cv::Mat rays = ws::ray_image(view.camera, {});
+  int beyond = 0;
+  int kept = 0;
+  for (int y = 0; y < rays.rows; ++y) {
+    for (int x = 0; x < rays.cols; ++x) {
+      const auto& ray = rays.at<cv::Vec4f>(y, x);
+      if (ray[3] == 0 || std::atan2(std::hypot(ray[0], ray[1]), ray[2]) < theta) continue;
+      ++beyond;
+      kept += view.mask.at<uchar>(y, x) != 0;
+    }
+  }
+  return 2 * kept < beyond;
 }
 
 }  // namespace
@@ -128,8 +147,7 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
 }
 
 bool RigSettings::looks_for_rim_of(const ws::Camera& camera) const {
-  return max_theta == 0 && masks.empty() && camera.max_theta >= std::numbers::pi &&
-         ws::may_show_rim(camera);
+  return max_theta == 0 && camera.max_theta >= std::numbers::pi && ws::may_show_rim(camera);
 }
 
 void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& images) const {
@@ -147,11 +165,14 @@ void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& 
       if (images[j].size() == cv::Size(camera.width, camera.height)) seen.push_back(images[j]);
     }
     const auto rim = ws::find_lens_rim(camera, seen);
+    bool is_told = false;
     for (const std::size_t j : of_camera) {
       limited[j] = true;
-      if (rim) rig.views[j].camera.max_theta = rim->usable;
+      if (!rim || mask_leaves_out(rig.views[j], rim->dark)) continue;
+      rig.views[j].camera.max_theta = rim->usable;
+      is_told = true;
     }
-    if (!rim) continue;
+    if (!is_told) continue;
     say(rig.views[i].name +
         (of_camera.size() > 1 ? ", like all images that are calibrated alike," : "") +
         ws::formatted(" is black from %.1f degrees off the axis on and matched up to %.1f "

@@ -45,9 +45,10 @@ struct RigSettings {
   widestereo::CalibratedImages images_of(const widestereo::SfmModel& model,
                                          const std::vector<std::string>& files) const;
 
-  /// Whether nothing says how far a camera sees.
+  /// Whether neither the calibration nor an option says how far a camera sees.
   bool looks_for_rim_of(const widestereo::Camera& camera) const;
-  /// Limits such cameras to what their images show, and says so; one image for each view.
+  /// Limits such cameras to what their images show, unless masks do, and says so; one image for
+  /// each view.
   void leave_out_dark_rims(widestereo::Rig& rig, const std::vector<cv::Mat>& images) const;
 
   /// Applies --mask and --max-theta.

@@ -39,8 +39,8 @@ void run_synthesis(const SynthesisArguments& a) {
     require_other_file(a.picture, read);
   }
   require_different_images({a.image, a.other});
-  cv::Mat image = ws::to_grey_levels(a.white_level.read(a.image), a.image);
-  cv::Mat other = ws::to_grey_levels(a.white_level.read(a.other), a.other);
+  cv::Mat image = ws::to_stretched_grey_levels(a.white_level.read(a.image), a.image);
+  cv::Mat other = ws::to_stretched_grey_levels(a.white_level.read(a.other), a.other);
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
   require_scaled_png("--png-scale", a.png_scale, a.distance);

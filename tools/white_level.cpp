@@ -17,15 +17,18 @@ void WhiteLevel::add_to(CLI::App& command) {
 }
 
 cv::Mat WhiteLevel::read(const std::filesystem::path& file) const {
-  constexpr double of_12_bits = 4095;
+  constexpr int of_10_bits = 1023, of_12_bits = 4095;
   const cv::Mat image = ws::read_image(file);
   if (value_ > 0) return ws::stretched(image, value_, file.string());
   if (told_ || image.depth() != CV_16U) return image;
   const double brightest = ws::largest_value(image);
   if (brightest > of_12_bits) return image;
   told_ = true;
+  const bool may_be_10_bits = brightest <= of_10_bits;
   say(file.string() + " has 16 bits, but no value above " + std::to_string(cvRound(brightest)) +
-      ", and is taken for a dark image; where the camera has 12 bits, give --white-level 4095.");
+      ", and is taken for a dark image; where the camera has " + (may_be_10_bits ? "10" : "12") +
+      " bits, give --white-level " + std::to_string(may_be_10_bits ? of_10_bits : of_12_bits) +
+      ".");
   return image;
 }
 

@@ -10,7 +10,8 @@
 namespace widestereo {
 
 /// Reads an 8- or 16-bit image, grey, BGR or BGRA, depth kept. Throws Error (missing, truncated,
-/// damaged, no image, of another type).
+/// damaged, no image, of another type); of a damaged file OpenCV's decoders may write to standard
+/// error, too, which cv::utils::logging silences in part.
 cv::Mat read_image(const std::filesystem::path& path);
 
 /// Of an image's grey or colour channels, not of its alpha; 0 where it is empty.
@@ -26,8 +27,17 @@ cv::Mat stretched(const cv::Mat& image, int white, const std::string& name);
 /// message.
 cv::Mat to_intensity(const cv::Mat& image, const std::string& name);
 
-/// The same as grey levels 0 to 255, CV_8UC1.
+/// By which intensities (CV_32FC1, negative = masked) of little contrast, as of dark or hazy images
+/// and of cameras with fewer bits than their files, are multiplied (Options::max_gain), 1 to
+/// `most`: what lies between all but the darkest and brightest 2 % then fills a quarter of [0, 1].
+double contrast_gain(const cv::Mat& intensity, double most);
+/// `most` of the presets `fast` and `quality`.
+inline constexpr double usual_max_gain = 20;
+
+/// Intensities as grey levels 0 to 255, CV_8UC1.
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
+/// The same of intensities multiplied by their contrast_gain().
+cv::Mat to_stretched_grey_levels(const cv::Mat& image, const std::string& name);
 /// Of a file, as read_image() reads it.
 cv::Mat read_grey_levels(const std::filesystem::path& path);
 

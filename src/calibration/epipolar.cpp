@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "calibration/match_rays.h"
 #include "geometry/angle.h"
 #include "geometry/validation.h"
+#include "io/intensity_range.h"
 #include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -35,7 +37,15 @@ struct Features {
 
 /// SIFT on a contrast-equalised image, descriptors in Hellinger form (square roots of shares).
 Features detect(const cv::Mat& image, const std::string& name) {
-  cv::Mat grey = to_grey_levels(image, name);
+  // Before it is rounded, so that dark and hazy images, and those of cameras with fewer bits than
+  // their files, have as many.
+  constexpr double outliers = 0.005;
+  constexpr double least_contrast = 0.01;
+  const cv::Mat intensity = to_intensity(image, name);
+  const auto [darkest, brightest] = intensity_range(intensity, outliers);
+  const double scale = 255 / std::max(brightest - darkest, least_contrast);
+  cv::Mat grey;
+  intensity.convertTo(grey, CV_8U, scale, -scale * darkest);
   cv::createCLAHE(3, {8, 8})->apply(grey, grey);
   Features features;
   cv::SIFT::create(6000)->detectAndCompute(grey, {}, features.points, features.descriptors);
@@ -62,6 +72,24 @@ std::vector<int> best_matches(const cv::Mat& a, const cv::Mat& b) {
     }
   }
   return best;
+}
+
+/// SIFT finds a point once for each of its orientations, which may be matched to different things.
+/// Leaves out those whose point at one end (`end`) has another point at the other (`other`).
+void remove_contradictions(std::vector<PixelMatch>& matches, Eigen::Vector2d PixelMatch::*end,
+                           Eigen::Vector2d PixelMatch::*other) {
+  constexpr double same_point = 2;  // pixels
+  const auto place = [end](const PixelMatch& match) {
+    return std::pair((match.*end).x(), (match.*end).y());
+  };
+  std::map<std::pair<double, double>, std::vector<Eigen::Vector2d>> others;
+  for (const PixelMatch& match : matches) others[place(match)].push_back(match.*other);
+  std::erase_if(matches, [&](const PixelMatch& match) {
+    const std::vector<Eigen::Vector2d>& found = others[place(match)];
+    return std::any_of(found.begin(), found.end(), [&](const Eigen::Vector2d& point) {
+      return (point - match.*other).norm() > same_point;
+    });
+  });
 }
 
 /// What a pair of views says of a match.
@@ -145,6 +173,8 @@ std::vector<PixelMatch> match_features(const cv::Mat& first, const cv::Mat& seco
     const cv::Point2d v = b.points[static_cast<std::size_t>(j)].pt;
     matches.push_back({{u.x, u.y}, {v.x, v.y}});
   }
+  remove_contradictions(matches, &PixelMatch::first, &PixelMatch::second);
+  remove_contradictions(matches, &PixelMatch::second, &PixelMatch::first);
   return matches;
 }
 

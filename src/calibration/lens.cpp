@@ -8,6 +8,7 @@
 #include <string>
 
 #include "geometry/angle.h"
+#include "geometry/validation.h"
 #include "statistics/percentile.h"
 #include "text/size_text.h"
 #include "widestereo/error.h"
@@ -22,7 +23,8 @@ constexpr std::size_t fewest_pixels_of_large = 50;           // of one from 200x
 constexpr double fewest_share = 1 / 800.0;                   // of an image in between
 constexpr std::size_t fewest_dark_rings = 3;                 // fewer may be noise
 constexpr std::size_t plateau_begin = 40, plateau_end = 10;  // rings inside of the dark
-constexpr float noise = 4.0F / 255;                          // of black pixels
+constexpr float most_noise = 4.0F / 255;                     // of black pixels, as files have it
+constexpr float noise_by_spread = 3;  // of those that surely are black: their median's to 95 %
 constexpr double smallest_rim = 60 * radians_per_degree;
 /// Reflections inside lenses reach no farther in.
 constexpr double widest_reflections = 0.08;  // of the angle
@@ -76,13 +78,19 @@ bool may_show_rim(const Camera& camera) {
 }
 
 std::optional<LensRim> find_lens_rim(const Camera& camera, const std::vector<cv::Mat>& images) {
-  std::vector<std::vector<float>> rings = rings_of(camera, brightest_of(camera, images));
+  validate(camera, "The camera of a rim");
+  const cv::Mat brightest = brightest_of(camera, images);
+  std::vector<std::vector<float>> rings = rings_of(camera, brightest);
   if (rings.size() < fewest_dark_rings) return std::nullopt;
   std::vector<float> dark_pixels;
   for (auto ring = rings.end() - fewest_dark_rings; ring != rings.end(); ++ring) {
     dark_pixels.insert(dark_pixels.end(), ring->begin(), ring->end());
   }
   const float black = percentile(dark_pixels, 0.5);
+  // Cameras with fewer bits than their files have as much less noise.
+  const auto gain = static_cast<float>(contrast_gain(brightest, usual_max_gain));
+  const float noise = std::clamp(noise_by_spread * (percentile(dark_pixels, 0.95) - black),
+                                 most_noise / gain, most_noise);
   const auto outermost = [&](std::size_t count, double share, float level) {
     while (count > 0 && percentile(rings[count - 1], share) - black <= level) --count;
     return count;

@@ -120,6 +120,8 @@ std::optional<SharpnessDifference> compare_sharpness(const View& first, const Vi
                                                      const std::vector<PixelMatch>& matches) {
   cv::Mat sharp = to_intensity(first_image, "The first image");
   cv::Mat blunt = to_intensity(second_image, "The second image");
+  sharp *= contrast_gain(sharp, usual_max_gain);
+  blunt *= contrast_gain(blunt, usual_max_gain);
   const EqualScale equal_scale(first, second);
   std::vector<cv::Point> in_sharp;
   std::vector<cv::Point> in_blunt;

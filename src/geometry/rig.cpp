@@ -40,6 +40,8 @@ bool is_masked(const View& view, const Eigen::Vector2d& position) {
 }
 
 void require_calibrated_size(const cv::Mat& map, const View& view, const std::string& name) {
+  require_pixels(map, name);
+  require_two_dimensions(map, name);
   const Camera& camera = view.camera;
   if (map.cols == camera.width && map.rows == camera.height) return;
   // To within half a pixel of either side, and by more than a crop of a few pixels.

@@ -137,11 +137,14 @@ void require_type(const cv::Mat& map, int type, const std::string& name) {
               cv::typeToString(type) + "; convert it or give another one.");
 }
 
+void require_two_dimensions(const cv::Mat& map, const std::string& name) {
+  if (map.dims <= 2) return;
+  throw Error(name + " has " + std::to_string(map.dims) +
+              " dimensions instead of 2; use maps of one view.");
+}
+
 void require_size(const cv::Mat& map, cv::Size size, const std::string& name) {
-  if (map.dims > 2) {
-    throw Error(name + " has " + std::to_string(map.dims) +
-                " dimensions instead of 2; use maps of one view.");
-  }
+  require_two_dimensions(map, name);
   if (map.size() == size) return;
   throw Error(name + " is " + size_text(map.cols, map.rows) + " pixels instead of " +
               size_text(size.width, size.height) + "; use maps of one view.");
@@ -158,10 +161,11 @@ void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std
 
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name) {
   if (mask.empty()) return;
-  if (mask.type() == CV_8UC1 && mask.cols == camera.width && mask.rows == camera.height) return;
+  require_type(mask, CV_8UC1, name + ": the mask");
+  if (mask.cols == camera.width && mask.rows == camera.height) return;
   throw Error(name + ": the mask is " + size_text(mask.cols, mask.rows) +
               " pixels, but the camera has " + size_text(camera.width, camera.height) +
-              "; use an 8-bit grey mask of that size.");
+              "; use one of that size.");
 }
 
 void require_valid(const View& view, const std::string& name) {

@@ -43,9 +43,11 @@ void require_baseline(const View& a, const View& b, const std::string& name);
 void require_pixels(const cv::Mat& map, const std::string& name);
 /// Throws Error unless a map has pixels, of a type such as CV_32FC1. `name` begins the message.
 void require_type(const cv::Mat& map, int type, const std::string& name);
+/// Throws Error where a map has more than rows and columns. `name` begins the message.
+void require_two_dimensions(const cv::Mat& map, const std::string& name);
 /// Throws Error unless a map has the size of the others of its view. `name` begins the message.
 void require_size(const cv::Mat& map, cv::Size size, const std::string& name);
-/// Both.
+/// Type and size.
 void require_map(const cv::Mat& map, cv::Size size, int type, const std::string& name);
 /// Both, of a map that may be empty.
 void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std::string& name);

@@ -16,7 +16,9 @@
 
 #include "geometry/validation.h"
 #include "io/exr.h"
+#include "io/intensity_range.h"
 #include "io/pfm.h"
+#include "statistics/percentile.h"
 #include "text/lower_case.h"
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -152,13 +154,14 @@ std::vector<uchar> encoded(const std::string& extension, const cv::Mat& image,
   return bytes;
 }
 
-/// Formats of 8 bits take images of 16, too, but OpenCV cuts off what is above 255.
-bool keeps_depth(const std::string& extension, const cv::Mat& image) {
+/// Formats of 8 bits take images of 16, too, but OpenCV cuts off what is above 255; those without
+/// transparency drop it.
+bool holds(const std::string& extension, const cv::Mat& image) {
   constexpr int side = 64;
   const cv::Mat part =
       image(cv::Rect(0, 0, std::min(image.cols, side), std::min(image.rows, side)));
   const std::vector<uchar> bytes = encoded(extension, part);
-  return !bytes.empty() && cv::imdecode(bytes, cv::IMREAD_UNCHANGED).depth() == image.depth();
+  return !bytes.empty() && cv::imdecode(bytes, cv::IMREAD_UNCHANGED).type() == image.type();
 }
 
 [[noreturn]] void refuse_format(const fs::path& path) {
@@ -294,9 +297,40 @@ cv::Mat read_mask(const std::filesystem::path& path) {
   return mask;
 }
 
+std::pair<double, double> intensity_range(const cv::Mat& intensity, double outliers) {
+  constexpr std::size_t sample = 100'000;
+  require_type(intensity, CV_32FC1, "The image of intensities");
+  std::vector<float> values;
+  const auto columns = static_cast<std::size_t>(intensity.cols);
+  const std::size_t step = intensity.total() / sample + 1;
+  for (std::size_t i = 0; i < intensity.total(); i += step) {
+    const float value =
+        intensity.at<float>(static_cast<int>(i / columns), static_cast<int>(i % columns));
+    if (value >= 0) values.push_back(value);
+  }
+  if (values.empty()) return {0, 0};
+  return {static_cast<double>(percentile(values, outliers)),
+          static_cast<double>(percentile(values, 1 - outliers))};
+}
+
+double contrast_gain(const cv::Mat& intensity, double most) {
+  constexpr double least_contrast = 0.25, outliers = 0.02;
+  if (most <= 1) return 1;
+  const auto [darkest, brightest] = intensity_range(intensity, outliers);
+  const double contrast = brightest - darkest;
+  return std::clamp(least_contrast / std::max(contrast, least_contrast / most), 1.0, most);
+}
+
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name) {
   cv::Mat grey;
   to_intensity(image, name).convertTo(grey, CV_8U, 255);
+  return grey;
+}
+
+cv::Mat to_stretched_grey_levels(const cv::Mat& image, const std::string& name) {
+  const cv::Mat intensity = to_intensity(image, name);
+  cv::Mat grey;
+  intensity.convertTo(grey, CV_8U, 255 * contrast_gain(intensity, usual_max_gain));
   return grey;
 }
 
@@ -349,8 +383,14 @@ void write_map(const fs::path& path, const cv::Mat& map, double png_scale) {
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {
-  require_pixels(image, "Cannot write " + path.string() + ": the image");
-  if (image.depth() != CV_8U && !keeps_depth(path.extension().string(), image)) refuse_format(path);
+  const std::string what = "Cannot write " + path.string() + ": the image";
+  require_pixels(image, what);
+  require_two_dimensions(image, what);
+  if (image.depth() != CV_8U && image.depth() != CV_16U) {
+    throw Error(what + " is " + cv::typeToString(image.type()) +
+                "; convert it to 8 or 16 bits, or write it as a map.");
+  }
+  if (!holds(path.extension().string(), image)) refuse_format(path);
   encode(path, image);
 }
 

@@ -9,7 +9,6 @@
 #include "kernel/maps.h"
 #include "matching/match_setup.h"
 #include "schedule/work.h"
-#include "statistics/percentile.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -39,23 +38,6 @@ cv::Mat masked_intensities(const cv::Mat& image, const View& view, const cv::Mat
     }
   });
   return intensity;
-}
-
-/// Dark, or hazy: what lies between the darkest and the brightest pixels is less than a quarter of
-/// all there is. By this factor, up to `most`, it becomes as much.
-double gain_for(const cv::Mat& masked_intensity, double most) {
-  constexpr double least_contrast = 0.25, outliers = 0.02;
-  constexpr std::size_t sample = 100'000;
-  if (most <= 1) return 1;
-  std::vector<float> values;
-  const std::size_t step = masked_intensity.total() / sample + 1;
-  for (std::size_t i = 0; i < masked_intensity.total(); i += step) {
-    const float value = masked_intensity.ptr<float>()[i];
-    if (value >= 0) values.push_back(value);
-  }
-  const double contrast = static_cast<double>(percentile(values, 1 - outliers)) -
-                          static_cast<double>(percentile(values, outliers));
-  return std::clamp(least_contrast / std::max(contrast, least_contrast / most), 1.0, most);
 }
 
 /// Distance, normal and cost maps of plane hypotheses; planes without a cost are left out.
@@ -173,7 +155,7 @@ class Matcher::Implementation {
     std::vector<double> gains;
     for (std::size_t i = 0; i < images.size(); ++i) {
       intensities.push_back(masked_intensities(images[i], rig_.views[i], rays_[i]));
-      gains.push_back(gain_for(intensities.back(), max_gain_));
+      gains.push_back(contrast_gain(intensities.back(), max_gain_));
       if (gains.back() == 1) continue;
       const cv::Mat masked = intensities.back() < 0;
       intensities.back() *= gains.back();

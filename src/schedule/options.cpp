@@ -8,6 +8,7 @@
 #include "schedule/option_names.h"
 #include "text/json_text.h"
 #include "widestereo/error.h"
+#include "widestereo/image_io.h"
 
 namespace widestereo {
 namespace {
@@ -53,7 +54,7 @@ Options Options::preset_named(const std::string& name) {
   options.max_cost = 2;
   options.min_confidence = 0.7;
   options.far_preference = 0.08;
-  options.max_gain = 20;
+  options.max_gain = usual_max_gain;
   options.warm_iterations = 1;
   options.pattern = PatchPattern::checkerboard;
   options.alternate_strips = true;

@@ -226,6 +226,24 @@ TEST(Epipolar, AFeatureIsMatchedOnce) {
   }
 }
 
+/// Of night, or of cameras with fewer bits than their files.
+TEST(Epipolar, FeaturesAreFoundInDarkImages) {
+  cv::Mat image(160, 200, CV_32FC1);
+  cv::RNG(6).fill(image, cv::RNG::UNIFORM, 0, 1);
+  cv::GaussianBlur(image, image, {}, 2);
+  cv::normalize(image, image, 0, 1, cv::NORM_MINMAX);
+  const auto matches = [&image](int type, double brightest) {
+    cv::Mat dark;
+    image.convertTo(dark, type, brightest);
+    return static_cast<double>(match_features(dark, dark).size());
+  };
+  const double usual = matches(CV_8U, 255);
+  ASSERT_GT(usual, 200);
+  EXPECT_GT(matches(CV_16U, 4095), 0.9 * usual);
+  EXPECT_GT(matches(CV_16U, 1023), 0.9 * usual);
+  EXPECT_GT(matches(CV_8U, 21), 0.8 * usual);
+}
+
 /// What is found at x must be found at the same place from the other end once the image is turned
 /// upside down.
 TEST(Epipolar, FeaturesLieWherePixelsDo) {

@@ -77,6 +77,15 @@ TEST(LensRim, IsFoundInSmallImages) {
   }
 }
 
+TEST(LensRim, IsFoundWhereTheCameraHasFewerBitsThanItsFiles) {
+  const cv::Mat image = photograph(fisheye(), [](double t) { return up_to(t, 90); });
+  cv::Mat of_10_bits;
+  image.convertTo(of_10_bits, CV_16U, 4);
+  const auto rim = find_lens_rim(fisheye(), {of_10_bits});
+  ASSERT_TRUE(rim);
+  EXPECT_NEAR(rim->dark / degree, 90, 0.6);
+}
+
 TEST(LensRim, IsNotFoundInAFewPixels) {
   Camera camera = fisheye();
   camera.width = camera.height = 12;

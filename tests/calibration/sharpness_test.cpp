@@ -106,6 +106,17 @@ TEST(Sharpness, ExposureDoesNotCount) {
   EXPECT_NEAR(found->blur, 1.5, 0.1);
 }
 
+TEST(Sharpness, OfCamerasWithFewerBitsThanTheirFilesIsFound) {
+  cv::Mat sharp;
+  cv::Mat blunt;
+  scene().convertTo(sharp, CV_16U, 4);
+  displaced(blurred(scene(), 1.5)).convertTo(blunt, CV_16U, 4);
+  const auto found = compare(sharp, blunt, grid());
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->sharper, 0);
+  EXPECT_NEAR(found->blur, 1.5, 0.1);
+}
+
 TEST(Sharpness, NoiseOfOneImageIsNone) {
   const cv::Mat image = grey_levels(scene());
   const cv::Mat noisy = grey_levels(displaced(scene()), 6);

@@ -453,7 +453,7 @@ class FewerBits : public Command {
       cv::imwrite(file(camera + "16.png"), image);
     }
   }
-  static constexpr const char* advice = "give --white-level 4095";
+  static constexpr const char* advice = "give --white-level 1023";
 };
 
 TEST_F(FewerBits, AreMatchedLikeAllBitsWhereTheWhiteLevelIsGiven) {
@@ -475,6 +475,23 @@ TEST_F(FewerBits, AreMatchedLikeAllBitsWhereTheWhiteLevelIsGiven) {
   EXPECT_GT(cv::norm(of_dark, map(), cv::NORM_L1), 1e-2 * cv::norm(map(), cv::NORM_L1));
   fs::remove_all(folder_ / "out");
   expect_error(depth_of("left.png", "right.png") + "--white-level 4095", "left.png has no 16 bits");
+}
+
+/// They match as well as others.
+TEST_F(FewerBits, AreNotCalledBlankNorWithoutTexture) {
+  for (const char* image : {"left16.png", "right16.png"}) {
+    const cv::Mat of_8_bits = cv::imread(file(image), cv::IMREAD_UNCHANGED);
+    cv::imwrite(file(image), 4 * of_8_bits);
+  }
+  const auto textured = [this](const std::string& left, const std::string& right) {
+    const Outcome outcome = run(depth_of(left, right) + "--max-gain 20 --json");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_EQ(outcome.output.find("blank"), std::string::npos) << outcome.output;
+    return json_of(outcome)["views"][0]["textured_pixels"].get<double>();
+  };
+  const double usual = textured("left.png", "right.png");
+  ASSERT_GT(usual, 1000);
+  EXPECT_GT(textured("left16.png", "right16.png"), 0.4 * usual);
 }
 
 TEST_F(FewerBits, AreStretchedByEveryCommand) {
@@ -811,6 +828,10 @@ TEST_F(Command, DarkRimsAreLeftOut) {
   EXPECT_TRUE(told);
   EXPECT_EQ(limits_of(depth + " --max-theta 180"), std::pair(180.0, false));
   EXPECT_EQ(limits_of(depth + " --mask " + file("rim.png")), std::pair(180.0, false));
+  cv::Mat without_bonnet(96, 96, CV_8UC1, cv::Scalar(255));
+  without_bonnet(cv::Rect(36, 80, 24, 16)) = 0;
+  cv::imwrite(file("bonnet.png"), without_bonnet);
+  EXPECT_EQ(limits_of(depth + " --mask " + file("bonnet.png")), std::pair(found, true));
   EXPECT_EQ(limits_of(depth_of("left.png", "right.png", "unlimited.yaml")),
             std::pair(180.0, false));
   for (const char* camera : {"cam0", "cam1"}) {

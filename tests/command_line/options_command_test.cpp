@@ -54,7 +54,7 @@ const std::vector<GivenOption> options_of_fast = {
     {"--min-parallax", "0.375", "min_parallax", 0.375},
     {"--max-tilt", "80.5", "max_tilt", 80.5},
     {"--min-support", "0.2", "min_support", 0.2},
-    {"--min-confidence", "0.7", "min_confidence", 0.7},
+    {"--min-confidence", "0.6", "min_confidence", 0.6},
     {"--ambiguity-margin", "0.15", "ambiguity_margin", 0.15},
     {"--fill-radius", "8", "fill_radius", 8}};
 
@@ -293,6 +293,10 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
   EXPECT_EQ(run("evaluate " + file("distance0.tiff") + " --view 0 --set " + file("set"))
                 .output.find("is scored"),
             std::string::npos);
+  const std::string alone = "evaluate " + file("distance0.tiff") + " --truth " +
+                            file("set/depth1.tiff") + " -c " + file("calib.yaml");
+  EXPECT_NE(run(alone).output.find("is scored as of view 1, by the record beside it"),
+            std::string::npos);
   // As OpenCV's samples write them, without a size.
   folder_.write("opencv.yml",
                 "K1: [30, 0, 47.5, 0, 30, 47.5, 0, 0, 1]\nD1: [0, 0, 0, 0]\n"
@@ -304,6 +308,7 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
     folder_.write("result.json", record);
     says(file("distance1.tiff"), "is scored as of view 1, by its name");
   }
+  EXPECT_EQ(run(alone).output.find("is scored"), std::string::npos) << "of a frame's number";
 }
 
 }  // namespace

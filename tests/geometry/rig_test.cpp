@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <opencv2/core.hpp>
 
 #include "error_of.h"
@@ -60,7 +61,7 @@ TEST(RigValidation, NamesWhatIsWrong) {
   rig.views[0].mask = cv::Mat(48, 63, CV_8UC1, cv::Scalar(1));
   EXPECT_NE(message_of(rig).find("mask"), std::string::npos);
   rig.views[0].mask = cv::Mat(48, 64, CV_32FC1, cv::Scalar(1));
-  EXPECT_NE(message_of(rig).find("mask"), std::string::npos);
+  EXPECT_NE(message_of(rig).find("the mask is CV_32FC1 instead of CV_8UC1"), std::string::npos);
 
   EXPECT_NE(message_of(Rig{}).find("no cameras"), std::string::npos);
 }
@@ -93,6 +94,16 @@ TEST(ResizedViews, ExcludePixelsHoweverManyTheyCover) {
     EXPECT_EQ(mask.at<uchar>(2016 * side / 4096, 1017 * side / 4096), 0) << side;
     EXPECT_EQ(mask.at<uchar>(side - 1, side - 1), 255) << side;
   }
+}
+
+TEST(Maps, WithoutPixelsAreNotOfAnotherSize) {
+  const View view = two_views().views[1];
+  const auto error = [&view](const cv::Mat& map) {
+    return test::error_of([&] { require_calibrated_size(map, view, "The image of cam1"); });
+  };
+  EXPECT_EQ(error({}), "The image of cam1 is empty; give one that has pixels.");
+  const std::array<int, 3> sizes = {48, 64, 3};
+  EXPECT_NE(error(cv::Mat(3, sizes.data(), CV_8UC1)).find("3 dimensions"), std::string::npos);
 }
 
 TEST(Maps, HaveTheCalibratedSize) {

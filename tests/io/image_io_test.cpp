@@ -180,6 +180,25 @@ TEST(Images, Of16BitsGoToFormatsThatHoldThem) {
   }
 }
 
+TEST(Images, ThatNoFormatHoldsAreRefused) {
+  const TemporaryFolder folder;
+  const auto error = [&](const std::string& name, const cv::Mat& image) {
+    return error_of([&] { write_image(folder / name, image); });
+  };
+  for (const char* name : {"a.jpg", "a.bmp"}) {
+    EXPECT_NE(error(name, cv::Mat::zeros(9, 7, CV_8UC4)).find("holds such an image"),
+              std::string::npos)
+        << name << " would drop the alpha";
+  }
+  for (const int type : {CV_32SC1, CV_32FC1, CV_64FC1}) {
+    EXPECT_NE(error("a.tiff", cv::Mat::zeros(9, 7, type)).find("convert it to 8 or 16 bits"),
+              std::string::npos);
+  }
+  const std::array<int, 3> sizes = {3, 4, 5};
+  EXPECT_NE(error("a.png", cv::Mat(3, sizes.data(), CV_16UC1)).find("3 dimensions"),
+            std::string::npos);
+}
+
 TEST(Images, BecomeIntensities) {
   EXPECT_FLOAT_EQ(to_intensity(cv::Mat(1, 1, CV_8UC1, cv::Scalar(51)), "x").at<float>(0), 0.2f);
   EXPECT_FLOAT_EQ(to_intensity(cv::Mat(1, 1, CV_16UC1, cv::Scalar(13107)), "x").at<float>(0), 0.2f);
@@ -206,6 +225,25 @@ TEST(Images, BecomeGreyLevels) {
   write_image(folder / "deep.png", deep);
   EXPECT_TRUE(same_bits(read_grey_levels(folder / "deep.png"), expected));
   EXPECT_NE(error_of([] { to_grey_levels({}, "none.png"); }).find("none.png"), std::string::npos);
+}
+
+TEST(Images, OfLittleContrastAreStretched) {
+  cv::Mat ramp(10, 100, CV_32FC1);
+  for (int x = 0; x < ramp.cols; ++x) ramp.col(x) = x / 99.0;
+  EXPECT_EQ(contrast_gain(0.3 * ramp, 20), 1);
+  EXPECT_NEAR(contrast_gain(0.1 * ramp + 0.5, 20), 0.25 / 0.096, 0.1);
+  EXPECT_NEAR(contrast_gain(0.02 * ramp, 20), 0.25 / 0.0192, 0.4);
+  EXPECT_EQ(contrast_gain(0.001 * ramp, 20), 20);
+  EXPECT_EQ(contrast_gain(0.001 * ramp, 1), 1);
+  cv::Mat masked = 0.1 * ramp;
+  masked.rowRange(0, 5) = -1;
+  EXPECT_NEAR(contrast_gain(masked, 20), 0.25 / 0.096, 0.1);
+  cv::Mat of_10_bits;
+  ramp.convertTo(of_10_bits, CV_16U, 1023);
+  double brightest = 0;
+  cv::minMaxLoc(to_stretched_grey_levels(of_10_bits, "x"), nullptr, &brightest);
+  EXPECT_NEAR(brightest, 0.25 / 0.96 * 255, 2);
+  EXPECT_TRUE(same_bits(to_stretched_grey_levels(ramp, "x"), to_grey_levels(ramp, "x")));
 }
 
 TEST(Images, OfFewerBitsAreStretched) {
