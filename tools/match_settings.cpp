@@ -47,8 +47,8 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
       ->capture_default_str()
       ->group(matching);
   const auto otherwise = [](double distance) {
-    return "; by default as the points of a COLMAP model or the demo's scene reach, else " +
-           CLI::detail::to_string(distance);
+    return "; " + CLI::detail::to_string(distance) +
+           " unless the points of a COLMAP model or the demo's scene tell it";
   };
   command
       .add_option("--min-distance", min_distance,

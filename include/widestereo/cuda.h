@@ -39,7 +39,7 @@ struct CudaWarmStart {
 
 /// Matches images of one rig on an application's streams. Not thread-safe; frames of one matcher
 /// must follow each other: on one stream, or on several that wait for each other. Results equal a
-/// Matcher's on the same device.
+/// Matcher's on the same device whose Options::max_gain is 1.
 class CudaMatcher {
  public:
   /// The device and context that are current in the calling thread.

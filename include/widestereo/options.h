@@ -85,7 +85,8 @@ struct Options {
   int refinements =
       4;  ///< random perturbations per pixel and iteration, 0..16; range halved each time
   /// Cost = mean over this many of the source views that see the patch, best first, or over all of
-  /// them if they are fewer; 1..8.
+  /// them if they are fewer; 1..8. Sources whose baseline across the ray is less than 5 % of the
+  /// longest count where no other sees the patch.
   int best_sources = 1;
   PatchPattern pattern = PatchPattern::dense;
   /// Weight (1 + |difference| / (8 scale))^-8, about exp(-|difference| / scale), of a sample whose
@@ -95,9 +96,10 @@ struct Options {
   Filter filter = Filter::device;
 
   /// Of SearchMethod::pyramid: the image pyramid's levels, each half the size of the finer one,
-  /// 1..most_levels; 0: as many as leave each coarsest image at least 40 pixels wide and high, so
-  /// that what lies amid a blank wall comes near its edges, however large the images; in any case
-  /// one for each number of the lists below, and fewer for many views (Matcher::most_views).
+  /// 1..most_levels; 0: as many as leave each coarsest image at least 40 whole pixels wide and
+  /// high, so that what lies amid a blank wall comes near its edges, however large the images; in
+  /// any case one for each number of the lists below, and fewer for many views
+  /// (Matcher::most_views).
   int levels = 0;
   int sweep_steps = 64;  ///< inverse distances tried at the coarsest level, 1..10000
   /// Finest level last, 0..1000; the first number is that of all coarser levels, too. Not more than
@@ -121,9 +123,9 @@ struct Options {
   /// ones up to this many pixels away, 0..10000; 0 = none do. Those that agree with another view to
   /// consistency_pixels take it only where it matches about as well as their own.
   int repair_radius = 32;
-  /// After that, every pixel takes the plane, of those around, for which the planes up to this many
-  /// pixels away and likeness of intensity in the other view speak most, 0..64; 0 = it keeps its
-  /// own.
+  /// After that, every pixel takes the plane, of those around and its own of before the regression,
+  /// for which the planes up to this many pixels away and likeness of intensity in the other view
+  /// speak most, 0..64; 0 = it keeps its own.
   int vote_radius = 10;
   /// At the end, pixels take the normal, of those around, that most planes around agree with.
   bool normal_vote = true;

@@ -97,8 +97,8 @@ class VulkanBindings {
 };
 
 /// Matches images of one rig in an application's command buffers. Not thread-safe; frames of one
-/// matcher must follow each other on one queue. Results equal a Matcher's on the same device, with
-/// VulkanHandles::extended_storage_formats or Filter::exact.
+/// matcher must follow each other on one queue. Results equal a Matcher's on the same device whose
+/// Options::max_gain is 1, with VulkanHandles::extended_storage_formats or Filter::exact.
 class VulkanMatcher {
  public:
   /// Allocates all memory, compiles the kernels, submits to the queue and waits for it.

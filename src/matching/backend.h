@@ -54,6 +54,7 @@ inline cv::Size size_of_texels(cv::Size size, const KernelConstants& constants) 
 /// split where a watchdog may end them.
 inline constexpr long long samples_of_discrete_gpu = 2'000'000'000;
 inline constexpr long long samples_of_integrated_gpu = 300'000'000;
+inline constexpr long long samples_of_software = 20'000'000;
 
 /// Throws Error unless a map for a view has its size and type.
 void require_map(const cv::Mat& map, int view, cv::Size size, int type);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <numeric>
 
 #include "vulkan/formats.h"
@@ -26,7 +25,7 @@ long long default_max_samples(VkPhysicalDeviceType type) {
     case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
       return samples_of_integrated_gpu;
     default:
-      return 20'000'000;
+      return samples_of_software;
   }
 }
 
