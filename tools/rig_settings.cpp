@@ -27,13 +27,14 @@ bool is_of_one_camera(const ws::Calibration& calibration) {
 /// may be of a vehicle's bonnet alone.
 bool mask_leaves_out(const ws::View& view, double theta) {
   if (view.mask.empty()) return false;
+  const auto least = static_cast<float>(theta);
   const cv::Mat rays = ws::ray_image(view.camera, {});
   int beyond = 0;
   int kept = 0;
   for (int y = 0; y < rays.rows; ++y) {
     for (int x = 0; x < rays.cols; ++x) {
       const auto& ray = rays.at<cv::Vec4f>(y, x);
-      if (ray[3] == 0 || std::atan2(std::hypot(ray[0], ray[1]), ray[2]) < theta) continue;
+      if (ray[3] == 0 || std::atan2(std::hypot(ray[0], ray[1]), ray[2]) < least) continue;
       ++beyond;
       kept += view.mask.at<uchar>(y, x) != 0;
     }
