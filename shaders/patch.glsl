@@ -77,7 +77,8 @@ FN CameraParameters camera_of_texels(CONTEXT_ARGUMENT CameraParameters camera, i
 }
 
 // Bilinear intensity, negative where it is not seen: any share of a masked texel outweighs the others (of half precision,
-// from 1/32768 on), and every image is surrounded by masked ones. The weights are exact, or those of the texture units (1/256 on most GPUs).
+// from 1/32768 on), and every image is surrounded by masked ones. The weights are exact, or those of the texture units
+// (1/256 on most GPUs).
 FN float sample_image(CONTEXT_ARGUMENT int view, ivec4 size, vec2 texel) {
 #ifdef HAS_DEVICE_FILTER
   if (FILTER == FILTER_DEVICE) return filtered_texel(CONTEXT view, texel);

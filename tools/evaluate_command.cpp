@@ -91,6 +91,7 @@ std::optional<int> camera_in_record(const fs::path& map, cv::Size size, int view
 /// `size`: of the map.
 void choose_views(EvaluateArguments& a, cv::Size size) {
   const auto by_record_or_name = [&] {
+    if (a.set.empty() && a.calibration.empty()) return 0;
     const int in_name = view_in_name(a.prediction, a.set);
     const auto in_record = camera_in_record(
         a.prediction, size, in_name,

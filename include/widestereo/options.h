@@ -152,7 +152,7 @@ struct Options {
   /// What is given in grey levels, here and in the kernels, is meant for images of usual contrast:
   /// a Matcher multiplies intensities of which all but 4 % lie within less than 64 grey levels by
   /// up to this factor, 1..1000, so that they fill these; 1 = none. A CudaMatcher or VulkanMatcher
-  /// takes images as they are.
+  /// takes images as they are; contrast_gain() tells the factor.
   double max_gain = 1;
   double min_texture = 0.5;  ///< grey levels (0..255): patches with a smaller standard deviation
                              ///< carry no information
