@@ -246,9 +246,10 @@ void add_evaluate_command(CLI::App& app) {
                    "Mask, 0 = outside the lens; for --far-distance")
       ->needs(far_distance);
   command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
-  command->add_option("--view", a->view_of_map,
-                      "Camera of the distance map (default 0, or with --set the one that the "
-                      "result's record names, or else the number in its name)");
+  command->add_option(
+      "--view", a->view_of_map,
+      "Camera of the distance map (default: the one that the result's record names, "
+      "or else with --set the number in its name, or else 0)");
   command->add_option(
       "--source", a->source_of_map,
       "Camera in which displacements are measured (default 1, or 0 for another view)");

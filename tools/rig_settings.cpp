@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "rig_settings.h"
 
-#include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
 
@@ -27,19 +26,15 @@ bool is_of_one_camera(const ws::Calibration& calibration) {
 /// may be of a vehicle's bonnet alone.
 bool mask_leaves_out(const ws::View& view, double theta) {
   if (view.mask.empty()) return false;
-  const auto least = static_cast<float>(theta);
-  const cv::Mat rays = ws::ray_image(view.camera, {});
-  int beyond = 0;
-  int kept = 0;
-  for (int y = 0; y < rays.rows; ++y) {
-    for (int x = 0; x < rays.cols; ++x) {
-      const auto& ray = rays.at<cv::Vec4f>(y, x);
-      if (ray[3] == 0 || std::atan2(std::hypot(ray[0], ray[1]), ray[2]) < least) continue;
-      ++beyond;
-      kept += view.mask.at<uchar>(y, x) != 0;
-    }
-  }
-  return 2 * kept < beyond;
+  const auto seen_by = [](const ws::Camera& camera) {
+    cv::Mat usable;
+    cv::extractChannel(ws::ray_image(camera, {}), usable, 3);
+    return cv::Mat(usable != 0);
+  };
+  ws::Camera within = view.camera;
+  within.max_theta = theta;
+  const cv::Mat beyond = seen_by(view.camera) & ~seen_by(within);
+  return 2 * cv::countNonZero(beyond & (view.mask != 0)) < cv::countNonZero(beyond);
 }
 
 }  // namespace
