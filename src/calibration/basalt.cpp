@@ -44,29 +44,31 @@ void add_defaults(Json& value) {
   value["vignette"] = Json::array();
 }
 
-double number(const Document& document, const Json& object, const std::string& key) {
+/// `where`: what has it, for messages.
+double number(const Document& document, const std::string& where, const Json& object,
+              const std::string& key) {
   if (!object.is_object() || !object.contains(key) || !object.at(key).is_number()) {
-    document.fail("The number \"" + key + "\" is missing.");
+    document.fail(where + ": The number \"" + key + "\" is missing", "add it");
   }
   return object.at(key).get<double>();
 }
 
 const Json& list(const Document& document, const Json& object, const char* key) {
   if (!object.is_object() || !object.contains(key) || !object.at(key).is_array()) {
-    document.fail(std::string("The list \"") + key +
-                  "\" of a Basalt calibration is missing; add it, or give another format.");
+    document.fail(std::string("The list \"") + key + "\" of a Basalt calibration is missing",
+                  "add it, or give another format");
   }
   return object.at(key);
 }
 
-Camera read_camera(const Document& document, const Json& entry) {
+Camera read_camera(const Document& document, const std::string& name, const Json& entry) {
   if (!entry.is_object() || !entry.contains("camera_type") ||
       !entry.at("camera_type").is_string() || !entry.contains("intrinsics")) {
-    document.fail("A camera lacks \"camera_type\" or \"intrinsics\".");
+    document.fail(name + ": It lacks \"camera_type\" or \"intrinsics\"", "add what is missing");
   }
   const std::string type = entry.at("camera_type").get<std::string>();
   const Json& values = entry.at("intrinsics");
-  const auto value = [&](const char* key) { return number(document, values, key); };
+  const auto value = [&](const char* key) { return number(document, name, values, key); };
   Camera camera;
   camera.fx = value("fx");
   camera.fy = value("fy");
@@ -82,7 +84,9 @@ Camera read_camera(const Document& document, const Json& entry) {
     camera.beta = value("beta");
   } else if (type == "ucm") {
     const double alpha = value("alpha");
-    if (!(alpha >= 0 && alpha < 1)) document.fail("The alpha of a ucm camera must lie in [0, 1).");
+    if (!(alpha >= 0 && alpha < 1)) {
+      document.fail(name + ": The alpha of a ucm camera must lie in [0, 1)", "correct it");
+    }
     set_unified_from_alpha(camera, alpha);
   } else if (type == "kb4") {
     camera.model = CameraModel::kannala_brandt;
@@ -102,25 +106,34 @@ Camera read_camera(const Document& document, const Json& entry) {
     const double largest_radius = value(largest_radius_key);
     if (largest_radius > 0) camera.max_theta = std::atan(largest_radius);
   } else {
-    document.fail("The camera_type \"" + type +
-                  "\" is unknown; use ds, eucm, ucm, kb4, fov, pinhole or " + radtan8 + ".");
+    document.fail(name + ": The camera_type \"" + type + "\" is unknown",
+                  std::string("use ds, eucm, ucm, kb4, fov, pinhole or ") + radtan8);
   }
   return simplified(camera);
 }
 
-Eigen::Isometry3d read_pose(const Document& document, const Json& entry) {
-  const auto value = [&](const char* key) { return number(document, entry, key); };
+Eigen::Isometry3d read_pose(const Document& document, const std::string& name, const Json& entry) {
+  const std::string what = name + ": T_imu_cam";
+  const auto value = [&](const char* key) { return number(document, what, entry, key); };
   const Eigen::Quaterniond rotation =
       require_unit({value("qw"), value("qx"), value("qy"), value("qz")},
-                   document.path.string() + ": T_imu_cam", "scale qx, qy, qz and qw alike");
-  return rigid(document, "T_imu_cam", rotation.toRotationMatrix(),
+                   document.path.string() + ": " + what, "scale qx, qy, qz and qw alike");
+  return rigid(document, what, rotation.toRotationMatrix(),
                {value("px"), value("py"), value("pz")});
 }
 
-int side(const Document& document, const Json& value) {
-  const std::optional<int> pixels = whole_number(value.is_number() ? value.get<double>() : 0);
-  if (!pixels) document.fail("\"resolution\" must hold pairs of whole numbers of pixels.");
-  return *pixels;
+cv::Size size_of(const Document& document, const std::string& name, const Json& value) {
+  const auto side = [&value](std::size_t i) -> std::optional<int> {
+    if (!value.is_array() || value.size() != 2 || !value[i].is_number()) return std::nullopt;
+    return whole_number(value[i].get<double>());
+  };
+  const std::optional<int> width = side(0);
+  const std::optional<int> height = side(1);
+  if (!width || !height) {
+    document.fail(name + ": \"resolution\" must hold pairs of whole numbers of pixels",
+                  "correct it");
+  }
+  return {*width, *height};
 }
 
 /// None where Basalt lacks the model.
@@ -201,7 +214,7 @@ Json parsed(const Document& document) {
     if (event == Json::parse_event_t::object_start) keys.emplace_back();
     if (event == Json::parse_event_t::object_end) keys.pop_back();
     if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second) {
-      document.fail("The key " + value.get<std::string>() + " is there twice; leave one.");
+      document.fail("The key " + value.get<std::string>() + " is there twice", "leave one");
     }
     return true;
   });
@@ -215,40 +228,39 @@ Rig read_basalt(const Document& document) {
   try {
     const Json root = parsed(document);
     if (!root.contains("value0")) {
-      document.fail(
-          "It has no \"value0\" as a Basalt calibration has; give one, or one of the other "
-          "formats.");
+      document.fail("It has no \"value0\" as a Basalt calibration has",
+                    "give one, or one of the other formats");
     }
     const Json& value = root.at("value0");
     const Json& cameras = list(document, value, "intrinsics");
     const Json& poses = list(document, value, "T_imu_cam");
     const Json& sizes = list(document, value, "resolution");
     if (cameras.empty() || cameras.size() != poses.size() || cameras.size() != sizes.size()) {
-      document.fail(
-          "\"intrinsics\", \"T_imu_cam\" and \"resolution\" must be lists of one length.");
+      document.fail("\"intrinsics\", \"T_imu_cam\" and \"resolution\" must be lists of one length",
+                    "add what is missing");
     }
     Rig rig;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       View& view = rig.views.emplace_back();
       view.name = "cam" + std::to_string(i);
-      view.camera = read_camera(document, cameras[i]);
-      if (!sizes[i].is_array() || sizes[i].size() != 2) {
-        document.fail("\"resolution\" must hold pairs of whole numbers of pixels.");
-      }
-      view.camera.width = side(document, sizes[i][0]);
-      view.camera.height = side(document, sizes[i][1]);
-      view.world_from_camera = read_pose(document, poses[i]);
+      view.camera = read_camera(document, view.name, cameras[i]);
+      const cv::Size size = size_of(document, view.name, sizes[i]);
+      view.camera.width = size.width;
+      view.camera.height = size.height;
+      view.world_from_camera = read_pose(document, view.name, poses[i]);
       if (value.contains(max_theta_key)) {
         const Json& limits = list(document, value, max_theta_key);
         if (limits.size() != cameras.size() || !limits[i].is_number()) {
-          document.fail(std::string("\"") + max_theta_key +
-                        "\" must hold one number for each camera.");
+          document.fail(
+              std::string("\"") + max_theta_key + "\" must hold one number for each camera",
+              "correct it");
         }
         view.camera.max_theta = limits[i].get<double>() * radians_per_degree;
       }
     }
     if (value.contains(time_offset_key)) {
-      const double offset = number(document, value, time_offset_key) / nanoseconds_per_second;
+      const double offset =
+          number(document, "value0", value, time_offset_key) / nanoseconds_per_second;
       for (View& view : rig.views) view.imu_time_offset = offset;
     }
     const Eigen::Isometry3d first_from_imu = rig.views.front().world_from_camera.inverse();
@@ -259,10 +271,11 @@ Rig read_basalt(const Document& document) {
     }
     return rig;
   } catch (const Json::parse_error& error) {
-    document.fail(std::string("It is not valid JSON (") + error.what() + ").");
+    document.fail(std::string("It is not valid JSON (") + error.what() + ")", "correct it there");
   } catch (const Json::exception& error) {
-    document.fail(std::string("It is not valid JSON of a Basalt calibration (") + error.what() +
-                  ").");
+    document.fail(
+        std::string("It is not valid JSON of a Basalt calibration (") + error.what() + ")",
+        "correct it there");
   }
 }
 

@@ -18,7 +18,7 @@ using Member = std::pair<const char*, double Camera::*>;
 /// A map of the file, by names that tell the camera and the map.
 YamlCamera part_of(const Document& document, const std::string& name, const YAML::Node& root,
                    const char* key) {
-  if (!root[key]) document.fail(name + ": The key " + key + " is missing.");
+  if (!root[key]) document.fail(name + ": The key " + key + " is missing", "add it");
   return {document, name + ": " + key, root[key]};
 }
 
@@ -79,9 +79,8 @@ View read_view(const Document& document, const std::string& name) {
       camera = camera_of(read_ocam_lens(part("poly_parameters"), part("affine_parameters")), width,
                          height, document, name);
     } else {
-      document.fail(
-          name + ": The model_type \"" + model +
-          "\" is not supported; use KANNALA_BRANDT, MEI, PINHOLE, PINHOLE_FULL or SCARAMUZZA.");
+      document.fail(name + ": The model_type \"" + model + "\" is not supported",
+                    "use KANNALA_BRANDT, MEI, PINHOLE, PINHOLE_FULL or SCARAMUZZA");
     }
     if (model != "KANNALA_BRANDT" && model != "SCARAMUZZA") {
       read_numbers(part(distortion), camera,
@@ -116,8 +115,9 @@ Rig read_vins(const Document& document,
     const std::string found = std::to_string(rig.views.size());
     const std::string stated = keys.text("num_of_cam", found.c_str());
     if (stated != found) {
-      document.fail("The key num_of_cam says " + stated + ", but cam0_calib and the next name " +
-                    found + "; correct one.");
+      document.fail(
+          "The key num_of_cam says " + stated + ", but cam0_calib and the next name " + found,
+          "correct one");
     }
     if (keys.text("imu", "1") == "0") {
       rig.world_from_imu.reset();

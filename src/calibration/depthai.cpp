@@ -47,8 +47,8 @@ Link read_link(const Document& document, const std::string& name, const YAML::No
   std::size_t known = 0;
   while (known < std::size(metres_of_units) && unit != static_cast<double>(known)) ++known;
   if (known == std::size(metres_of_units)) {
-    document.fail(name + ": The lengthUnit is " + text_of(unit) +
-                  "; metres (0) to feet (4) are known.");
+    document.fail(name + ": The lengthUnit is " + text_of(unit),
+                  "metres (0) to feet (4) are known");
   }
   const YamlCamera of_unit(document, name + ": translation", node["translation"]);
   const Eigen::Vector3d translation(of_unit.number("x"), of_unit.number("y"), of_unit.number("z"));
@@ -67,7 +67,8 @@ Camera read_camera(const Document& document, const std::string& name, const Yaml
   } else if (type == fisheye) {
     set_fisheye(camera, keys.numbers("distortionCoeff", 4));
   } else {
-    document.fail(name + ": The cameraType is none of 0 (perspective) and 1 (fisheye).");
+    document.fail(name + ": The cameraType is none of 0 (perspective) and 1 (fisheye)",
+                  "correct it");
   }
   set_matrix(camera, document, name + ": The intrinsicMatrix", keys.matrix("intrinsicMatrix"));
   camera.width = keys.side("width");
@@ -107,13 +108,14 @@ Rig read_depthai(const Document& document) {
   // JSON is YAML, too.
   read_yaml(document, [&](const YAML::Node& root) {
     const YAML::Node list = root[cameras_key];
-    if (!list || !list.IsSequence()) document.fail("The list cameraData is missing.");
+    if (!list || !list.IsSequence()) document.fail("The list cameraData is missing", "add it");
     std::map<int, SocketCamera> cameras;
     for (const YAML::Node& entry : list) {
       const bool is_pair = entry.IsSequence() && entry.size() == 2;
       const int socket = is_pair ? socket_of(entry[0].as<double>(-1)) : -1;
       if (socket < 0) {
-        document.fail("The list cameraData does not hold pairs of a socket and its camera.");
+        document.fail("The list cameraData does not hold pairs of a socket and its camera",
+                      "correct it");
       }
       SocketCamera camera;
       camera.view.name = "CAM_";
@@ -124,15 +126,18 @@ Rig read_depthai(const Document& document) {
       camera.view.camera = read_camera(document, camera.view.name, keys);
       camera.link = read_link(document, camera.view.name + ": extrinsics", entry[1]["extrinsics"]);
       if (!cameras.emplace(socket, std::move(camera)).second) {
-        document.fail("The list cameraData has a socket twice.");
+        document.fail("The list cameraData has the socket of " + camera.view.name + " twice",
+                      "leave one");
       }
     }
-    if (cameras.empty()) document.fail("The list cameraData has no calibrated camera.");
+    if (cameras.empty())
+      document.fail("The list cameraData has no calibrated camera", "calibrate the device");
     find_poses(cameras);
     for (auto& [socket, camera] : cameras) {
       if (!camera.first_from_camera) {
         document.fail(camera.view.name + ": No toCameraSocket links it to " +
-                      cameras.begin()->second.view.name + "; calibrate the cameras together.");
+                          cameras.begin()->second.view.name,
+                      "calibrate the cameras together");
       }
       camera.view.world_from_camera = *camera.first_from_camera;
       rig.views.push_back(camera.view);

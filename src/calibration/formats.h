@@ -22,8 +22,8 @@ struct Document {
   /// Outside comments.
   bool contains(const char* words) const;
 
-  /// Error whose message begins with the file's name.
-  [[noreturn]] void fail(const std::string& what) const;
+  /// Throws Error: the file's name, what was found there and what to do about it.
+  [[noreturn]] void fail(const std::string& finding, const std::string& remedy) const;
 };
 
 /// Adds a view whose pose in a body is known. The first view's frame is the world, the body the

@@ -34,8 +34,8 @@ void require_all_cameras(const Document& document, const YAML::Node& root, const
     if (number.empty() || number.find_first_not_of("0123456789") != std::string::npos) continue;
     if (std::none_of(rig.views.begin(), rig.views.end(),
                      [&name](const View& view) { return view.name == name; })) {
-      document.fail("It has " + name + " but no cam" + std::to_string(rig.views.size()) +
-                    "; number the cameras from cam0 without gaps.");
+      document.fail("It has " + name + " but no cam" + std::to_string(rig.views.size()),
+                    "number the cameras from cam0 without gaps");
     }
   }
 }
@@ -71,7 +71,7 @@ Rig read_kalibr(const Document& document) {
     }
     require_all_cameras(document, root, rig);
     if (rig.views.empty()) {
-      document.fail("It holds no cameras; a Kalibr camchain has keys cam0, cam1, ...");
+      document.fail("It holds no cameras", "a Kalibr camchain has keys cam0, cam1, and so on");
     }
   });
   return rig;

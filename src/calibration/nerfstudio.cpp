@@ -50,6 +50,53 @@ bool has_frames(const Json& root) {
   return root.is_object() && root.contains("frames") && root["frames"].is_array();
 }
 
+/// Finds a list "frames" of the outermost object without keeping anything, and stops there: files
+/// of other kinds may be large.
+class FrameFinder : public nlohmann::json_sax<Json> {
+ public:
+  bool found() const { return found_; }
+
+  bool key(string_t& name) override {
+    is_frames_ = depth_ == 1 && name == "frames";
+    return true;
+  }
+  bool start_object(std::size_t /*elements*/) override {
+    ++depth_;
+    return value();
+  }
+  bool end_object() override {
+    --depth_;
+    return true;
+  }
+  bool start_array(std::size_t /*elements*/) override {
+    found_ = is_frames_;
+    ++depth_;
+    return !found_;
+  }
+  bool end_array() override { return end_object(); }
+  bool null() override { return value(); }
+  bool boolean(bool /*value*/) override { return value(); }
+  bool number_integer(number_integer_t /*value*/) override { return value(); }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return value(); }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return value(); }
+  bool string(string_t& /*value*/) override { return value(); }
+  bool binary(binary_t& /*value*/) override { return value(); }
+  bool parse_error(std::size_t /*position*/, const std::string& /*token*/,
+                   const nlohmann::detail::exception& /*error*/) override {
+    return false;
+  }
+
+ private:
+  bool value() {
+    is_frames_ = false;
+    return true;
+  }
+
+  int depth_ = 0;
+  bool is_frames_ = false;  ///< what comes next
+  bool found_ = false;
+};
+
 /// What writers leave empty is not there.
 void remove_nulls(Json& object) {
   if (!object.is_object()) return;
@@ -61,8 +108,9 @@ void remove_nulls(Json& object) {
 class Reader {
  public:
   explicit Reader(const fs::path& file) : document_{file, {}}, root_(parsed(file)) {
-    if (!has_frames(root_)) document_.fail("It has no list \"frames\"; is it damaged?");
-    if (root_["frames"].empty()) document_.fail("Its list \"frames\" is empty.");
+    if (!has_frames(root_))
+      document_.fail("It has no list \"frames\"", "it may be damaged: copy it again");
+    if (root_["frames"].empty()) document_.fail("Its list \"frames\" is empty", "add the images");
     remove_nulls(root_);
     for (Json& frame : root_["frames"]) remove_nulls(frame);
   }
@@ -71,7 +119,7 @@ class Reader {
     Transforms transforms;
     for (std::size_t i = 0; i < root_["frames"].size(); ++i) {
       const Json& frame = root_["frames"][i];
-      if (!frame.is_object()) fail(i, "It is no object.");
+      if (!frame.is_object()) fail(i, "It is no object", "correct it");
       ColmapImage image = image_of(frame, i);
       const bool has_own =
           std::any_of(std::begin(camera_keys), std::end(camera_keys),
@@ -88,8 +136,9 @@ class Reader {
   }
 
  private:
-  [[noreturn]] void fail(std::size_t frame, const std::string& what) const {
-    document_.fail("Frame " + std::to_string(frame) + ": " + what);
+  [[noreturn]] void fail(std::size_t frame, const std::string& finding,
+                         const std::string& remedy) const {
+    document_.fail("Frame " + std::to_string(frame) + ": " + finding, remedy);
   }
 
   /// The frame's own value, else that of all frames; null where there is none.
@@ -103,7 +152,7 @@ class Reader {
   double number(const Json& frame, std::size_t i, const char* key) const {
     const Json* value = find(frame, key);
     if (value == nullptr || !value->is_number()) {
-      fail(i, "The number \"" + std::string(key) + "\" is missing.");
+      fail(i, "The number \"" + std::string(key) + "\" is missing", "add it");
     }
     return value->get<double>();
   }
@@ -123,13 +172,13 @@ class Reader {
     for (const char* key : lens_keys) {
       const Json* value = find(frame, key);
       if (value == nullptr || *value == false || *value == 0) continue;
-      fail(i, "The lens that \"" + std::string(key) +
-                  "\" stands for is not supported; give a camera_model instead.");
+      fail(i, "The lens that \"" + std::string(key) + "\" stands for is not supported",
+           "give a camera_model instead");
     }
     const Json* fisheye = find(frame, "is_fisheye");
     std::string name = fisheye != nullptr && *fisheye == true ? "OPENCV_FISHEYE" : "OPENCV";
     if (const Json* given = find(frame, "camera_model")) {
-      if (!given->is_string()) fail(i, "\"camera_model\" is no string.");
+      if (!given->is_string()) fail(i, "\"camera_model\" is no string", "correct it");
       name = given->get<std::string>();
     }
     return name;
@@ -142,8 +191,8 @@ class Reader {
     const Json* list = find(frame, coefficient_list);
     for (const auto& [key, member] : coefficient_keys) {
       if (list != nullptr && has(frame, key)) {
-        fail(i, std::string("It has both \"") + coefficient_list + "\" and \"" + key +
-                    "\"; remove what is not meant.");
+        fail(i, std::string("It has both \"") + coefficient_list + "\" and \"" + key + "\"",
+             "remove what is not meant");
       }
       camera.*member = number_or(0, frame, i, key);
     }
@@ -152,8 +201,10 @@ class Reader {
                           std::all_of(list->begin(), list->end(),
                                       [](const Json& value) { return value.is_number(); });
     if (!complete) {
-      fail(i, std::string("\"") + coefficient_list + "\" is no list of " +
-                  std::to_string(listed.size()) + " numbers, as its camera model has.");
+      fail(i,
+           std::string("\"") + coefficient_list + "\" is no list of " +
+               std::to_string(listed.size()) + " numbers, as its camera model has",
+           "correct it");
     }
     for (std::size_t k = 0; k < listed.size(); ++k) camera.*listed[k] = (*list)[k].get<double>();
     return camera;
@@ -183,8 +234,9 @@ class Reader {
     };
     if (model == nullptr ||
         !std::all_of(model->coefficients.begin(), model->coefficients.end(), has_key)) {
-      fail(i, "The camera model " + name + " is not supported; OPENCV_FISHEYE, OPENCV, PINHOLE, " +
-                  aria_name + " and EQUIRECTANGULAR are.");
+      fail(i, "The camera model " + name + " is not supported",
+           std::string("OPENCV_FISHEYE, OPENCV, PINHOLE, ") + aria_name +
+               " and EQUIRECTANGULAR are");
     }
     ColmapCamera camera;
     camera.model = model;
@@ -207,7 +259,8 @@ class Reader {
     }
     if (std::any_of(std::begin(coefficient_keys), std::end(coefficient_keys),
                     [&given](const auto& key) { return given.*key.second != 0; })) {
-      fail(i, "There are coefficients that the camera model " + name + " does not have.");
+      fail(i, "There are coefficients that the camera model " + name + " does not have",
+           "correct either");
     }
     return camera;
   }
@@ -215,7 +268,7 @@ class Reader {
   ColmapImage image_of(const Json& frame, std::size_t i) const {
     const auto text = [&](const char* key) {
       if (!frame.contains(key) || !frame[key].is_string()) {
-        fail(i, "The string \"" + std::string(key) + "\" is missing.");
+        fail(i, "The string \"" + std::string(key) + "\" is missing", "add it");
       }
       return fs::path(frame[key].get<std::string>()).lexically_normal();
     };
@@ -241,7 +294,8 @@ class Reader {
         if (complete) matrix(y, x) = rows[y][x].get<double>();
       }
     }
-    if (!complete) fail(i, "\"transform_matrix\" (4x4 numbers) is missing or incomplete.");
+    if (!complete)
+      fail(i, "\"transform_matrix\" (4x4 numbers) is missing or incomplete", "add all of it");
     const Eigen::Matrix3d axes = Eigen::Vector3d(1, -1, -1).asDiagonal();
     const std::string what = "The transform_matrix of frame " + std::to_string(i);
     require_last_row(document_, what, matrix.row(3));
@@ -257,8 +311,10 @@ class Reader {
 
 bool is_transforms_file(const fs::path& path) {
   std::error_code ignored;
-  return path.extension() == ".json" && fs::is_regular_file(path, ignored) &&
-         has_frames(parsed(path));
+  if (path.extension() != ".json" || !fs::is_regular_file(path, ignored)) return false;
+  FrameFinder frames;
+  Json::sax_parse(TextInput(path).rest(), &frames);
+  return frames.found();
 }
 
 Transforms read_transforms(const fs::path& file) { return Reader(file).read(); }

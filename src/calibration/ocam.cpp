@@ -122,7 +122,7 @@ std::vector<std::vector<double>> lines_of_numbers(const Document& document) {
     std::vector<double> numbers;
     for (std::string word; words >> word;) {
       const std::optional<double> number = number_of(word);
-      if (!number) document.fail("\"" + word + "\" is not a finite number.");
+      if (!number) document.fail("\"" + word + "\" is not a finite number", "correct it");
       numbers.push_back(*number);
     }
     if (!numbers.empty()) lines.push_back(std::move(numbers));
@@ -135,13 +135,13 @@ std::vector<std::vector<double>> lines_of_numbers(const Document& document) {
 Camera camera_of(const OCamLens& lens, int width, int height, const Document& document,
                  const std::string& what) {
   const auto fail = [&](const std::string& reason) {
-    document.fail(what + ": " + reason + " calibrate the lens again.");
+    document.fail(what + ": " + reason, "calibrate the lens again");
   };
   if (!(lens.matrix.determinant() > 0.1)) {
-    fail("The affine parameters c, d and e do not turn an image into one;");
+    fail("The affine parameters c, d and e do not turn an image into one");
   }
   if (lens.polynomial.empty() || lens.polynomial.front() == 0) {
-    fail("The polynomial does not begin with a number other than 0;");
+    fail("The polynomial does not begin with a number other than 0");
   }
   Camera camera;
   camera.width = width;
@@ -160,7 +160,7 @@ Camera camera_of(const OCamLens& lens, int width, int height, const Document& do
     }
     end *= 0.97;
   }
-  fail("The polynomial is that of no lens;");
+  fail("The polynomial is that of no lens");
   return camera;
 }
 
@@ -176,15 +176,19 @@ Rig read_ocam(const Document& document) {
       lines[size].size() != 2) {
     document.fail(
         "It must have five lines of numbers: two polynomials, the centre (row, column), the affine "
-        "parameters (c, d, e) and the image size (height, width); is it truncated?");
+        "parameters (c, d, e) and the image size (height, width)",
+        "it may be truncated: copy it again");
   }
   const std::optional<std::vector<double>> coefficients = after_count(lines[polynomial]);
   if (!coefficients) {
-    document.fail("The first polynomial does not have as many coefficients as it says.");
+    document.fail("The first polynomial does not have as many coefficients as it says",
+                  "correct one or the other");
   }
   const auto side = [&](double value) {
     const std::optional<int> pixels = whole_number(value);
-    if (!pixels) document.fail("The image size is not a pair of whole numbers of pixels.");
+    if (!pixels) {
+      document.fail("The image size is not a pair of whole numbers of pixels", "correct it");
+    }
     return *pixels;
   };
   Rig rig;
@@ -204,17 +208,18 @@ Rig read_omnimvs(const Document& document) {
   Rig rig;
   read_yaml(document, [&](const YAML::Node& root) {
     const YAML::Node cameras = root["cameras"];
-    if (!cameras || !cameras.IsSequence()) document.fail("The list cameras is missing.");
+    if (!cameras || !cameras.IsSequence()) document.fail("The list cameras is missing", "add it");
     for (const YAML::Node& node : cameras) {
       View view;
       view.name = "cam" + std::to_string(rig.views.size());
       const YamlCamera keys(document, view.name, node);
       if (const std::string model = keys.text("model", "ocam"); model != "ocam") {
-        document.fail(view.name + ": The model \"" + model + "\" is not supported; use ocam.");
+        document.fail(view.name + ": The model \"" + model + "\" is not supported", "use ocam");
       }
       const std::optional<std::vector<double>> polynomial = after_count(keys.numbers("poly"));
       if (!polynomial) {
-        document.fail(view.name + ": The key poly does not list as many numbers as it says.");
+        document.fail(view.name + ": The key poly does not list as many numbers as it says",
+                      "correct one or the other");
       }
       OCamLens lens = lens_of(*polynomial, keys.numbers("center", 2), keys.numbers("affine", 3));
       if (keys.has("max_fov")) lens.max_theta = 0.5 * keys.number("max_fov") * radians_per_degree;

@@ -61,8 +61,8 @@ std::string parsable(const Document& document) {
   constexpr std::size_t most = 5000;  // 2 MiB of stack at 400 bytes a level
   if (most_levels(document.text) > most) {
     document.fail("It has more than " + std::to_string(most) +
-                  " brackets, keys and items, which may be too deep in each other for OpenCV; "
-                  "leave only those of the calibration.");
+                      " brackets, keys and items, which may be too deep in each other for OpenCV",
+                  "leave only those of the calibration");
   }
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
   const bool is_told = first != std::string::npos &&
@@ -76,7 +76,8 @@ class Storage {
   explicit Storage(const Document& document)
       : document_(document),
         file_(parsable(document), cv::FileStorage::READ | cv::FileStorage::MEMORY) {
-    if (!file_.isOpened()) document_.fail("OpenCV cannot read it; is it truncated?");
+    if (!file_.isOpened())
+      document_.fail("OpenCV cannot read it", "it may be truncated: copy it again");
     for (const char* key : matrix_0) {
       begins_with_0_ = begins_with_0_ || !node_of(key).empty();
     }
@@ -114,7 +115,7 @@ class Storage {
       if (value.empty() || value.channels() != 1) continue;
       value.convertTo(value, CV_64F);
       if (!cv::checkRange(value)) {
-        document_.fail("The matrix " + key + " holds a number that is not finite.");
+        document_.fail("The matrix " + key + " holds a number that is not finite", "correct it");
       }
       return value.reshape(1, value.rows);
     }
@@ -125,7 +126,8 @@ class Storage {
     cv::Mat value = matrix(keys);
     if (value.empty() || static_cast<int>(value.total()) < elements) {
       document_.fail(std::string("The ") + what + " (" + *keys.begin() + ", at least " +
-                     std::to_string(elements) + " numbers) is missing.");
+                         std::to_string(elements) + " numbers) is missing",
+                     "add it");
     }
     return value;
   }
@@ -137,9 +139,9 @@ class Storage {
     if (both.total() == 2) return size_of(both.at<double>(0), both.at<double>(1));
     if (!both.empty()) refuse_size();
     if (width.empty() != height.empty()) {
-      document_.fail(width.empty()
-                         ? "It has its images' height without their width; add image_width."
-                         : "It has its images' width without their height; add image_height.");
+      const char* missing = width.empty() ? "width" : "height";
+      document_.fail(std::string("It has one side of its images without their ") + missing,
+                     std::string("add image_") + missing);
     }
     return width.empty() ? cv::Size() : size_of(width.at<double>(0), height.at<double>(0));
   }
@@ -188,8 +190,8 @@ class Storage {
     for (const char* side : {"rows", "cols"}) {
       const double count = node[side].isInt() ? node[side].real() : -1;
       if (count < 0 || count > largest_side) {
-        document_.fail(std::string("The matrix ") + key + " has an impossible number of " + side +
-                       ".");
+        document_.fail(std::string("The matrix ") + key + " has an impossible number of " + side,
+                       "correct it");
       }
     }
   }
@@ -202,7 +204,7 @@ class Storage {
   }
 
   [[noreturn]] void refuse_size() const {
-    document_.fail("The image size is not a pair of whole numbers of pixels; correct it.");
+    document_.fail("The image size is not a pair of whole numbers of pixels", "correct it");
   }
 
   const Document& document_;
@@ -257,7 +259,7 @@ constexpr int kannala_brandt_coefficients = 4;
 void require_zero(const Document& document, const std::string& what, std::span<const double> excess,
                   const std::string& remedy) {
   if (std::ranges::all_of(excess, [](double value) { return value == 0; })) return;
-  document.fail(what + " has non-zero coefficients that are not supported; " + remedy);
+  document.fail(what + " has non-zero coefficients that are not supported", remedy);
 }
 
 /// A camera of cv::omnidir whose xi is overlooked would be taken for one of cv::fisheye.
@@ -275,7 +277,8 @@ void require_known_xi(const Document& document, const Storage& storage) {
     if (start != "xi" && start != "Xi" && start != "XI") continue;
     if (holds_number(key)) continue;
     document.fail("The xi of a camera must be a number by the name xi, " + storage.key_of("xi1") +
-                  " or " + storage.key_of("xi2") + "; correct " + key + ".");
+                      " or " + storage.key_of("xi2"),
+                  "correct " + key);
   }
 }
 
@@ -289,7 +292,7 @@ Camera read_lens(const Document& document, const Storage& storage, const CameraK
   Camera camera;
   if (!xi.empty()) {
     require_zero(document, what, std::span(c).subspan(4),
-                 "cv::omnidir has four, k1 k2 p1 p2: calibrate with it.");
+                 "cv::omnidir has four, k1 k2 p1 p2: calibrate with it");
     camera.model = CameraModel::mei;
     camera.xi = xi.at<double>(0);
     camera.k1 = c[0];
@@ -304,8 +307,8 @@ Camera read_lens(const Document& document, const Storage& storage, const CameraK
   const bool fisheye = says_fisheye.total() == 1 ? says_fisheye.at<double>(0) != 0 : four;
   if (fisheye && !four) {
     document.fail(what + " has " + std::to_string(c.size()) +
-                  " coefficients, but fisheye_model asks for the four of cv::fisheye; correct what "
-                  "is wrong.");
+                      " coefficients, but fisheye_model asks for the four of cv::fisheye",
+                  "correct what is wrong");
   }
   if (!fisheye) return rational_camera(document, what, c);
   set_fisheye(camera, c);
@@ -317,8 +320,9 @@ Camera read_camera(const Document& document, const Storage& storage, const Camer
   const std::string what = std::string(keys.name) + ": The camera matrix (" + *keys.k.begin() + ")";
   cv::Mat k = storage.required(keys.k, 9, "camera matrix");
   if (k.total() != 9) {
-    document.fail(what + " is " + std::to_string(k.rows) + "x" + std::to_string(k.cols) +
-                  " instead of 3x3; correct it.");
+    document.fail(
+        what + " is " + std::to_string(k.rows) + "x" + std::to_string(k.cols) + " instead of 3x3",
+        "correct it");
   }
   k = k.reshape(1, 3);
   Camera camera = read_lens(document, storage, keys);
@@ -339,8 +343,9 @@ void require_centre(const Document& document, const View& view) {
   };
   if (is_near_middle(c.cx, c.width) && is_near_middle(c.cy, c.height)) return;
   document.fail("It has no image size, and the principal point of " + view.name +
-                " is not near the middle of the given images of " + size_text(c.width, c.height) +
-                " pixels; add image_width and image_height, those of the images it was made with.");
+                    " is not near the middle of the given images of " +
+                    size_text(c.width, c.height) + " pixels",
+                "add image_width and image_height, those of the images it was made with");
 }
 
 /// A key of ours, one number for each camera.
@@ -348,7 +353,8 @@ void limit_fields_of_view(Rig& rig, const Document& document, const Storage& sto
   const cv::Mat degrees = storage.matrix({max_theta_key});
   if (degrees.empty()) return;
   if (degrees.total() != rig.views.size()) {
-    document.fail(std::string(max_theta_key) + " must hold one number for each camera.");
+    document.fail(std::string(max_theta_key) + " must hold one number for each camera",
+                  "correct it");
   }
   for (std::size_t i = 0; i < rig.views.size(); ++i) {
     rig.views[i].camera.max_theta = degrees.at<double>(static_cast<int>(i)) * radians_per_degree;
@@ -364,18 +370,19 @@ Eigen::Isometry3d second_from_first(const Storage& storage, const Document& docu
                    : storage.required(keys, 3, what);
   };
   if (both.empty() && storage.matrix(rotation_keys).empty()) {
-    document.fail(
-        "It has two cameras without the rotation (R) and translation (T) between them; add those, "
-        "as from the other file of OpenCV's stereo calibration.");
+    document.fail("It has two cameras without the rotation (R) and translation (T) between them",
+                  "add those, as from the other file of OpenCV's stereo calibration");
   }
   cv::Mat rotation = part(rotation_keys, 0, "rotation");
   if (rotation.total() == 3) cv::Rodrigues(rotation.clone().reshape(1, 3), rotation);
   const cv::Mat translation = part({"T", "t", "tvec", "translation"}, 3, "translation");
   if (translation.total() != 3) {
     document.fail("The translation (T) has " + std::to_string(translation.total()) +
-                  " numbers instead of three; correct it.");
+                      " numbers instead of three",
+                  "correct it");
   }
-  if (rotation.rows != 3 || rotation.cols != 3) document.fail("The rotation R must be 3x3.");
+  if (rotation.rows != 3 || rotation.cols != 3)
+    document.fail("The rotation R must be 3x3", "correct it");
   Eigen::Matrix3d r;
   cv::cv2eigen(rotation, r);
   const cv::Mat_<double> t = translation.reshape(1, 1);
@@ -399,7 +406,7 @@ Camera rational_camera(const Document& document, const std::string& what,
   constexpr double C::*members[] = {&C::k1, &C::k2, &C::p1, &C::p2, &C::k3, &C::k4,
                                     &C::k5, &C::k6, &C::s1, &C::s2, &C::s3, &C::s4};
   const std::size_t used = std::min(coefficients.size(), std::size(members));
-  require_zero(document, what, coefficients.subspan(used), "calibrate without CALIB_TILTED_MODEL.");
+  require_zero(document, what, coefficients.subspan(used), "calibrate without CALIB_TILTED_MODEL");
   Camera camera;
   camera.model = CameraModel::pinhole_rational;
   for (std::size_t i = 0; i < used; ++i) camera.*members[i] = coefficients[i];
@@ -414,10 +421,9 @@ void set_matrix(Camera& camera, const Document& document, const std::string& wha
            (m.row(2) - Eigen::RowVector3d::UnitZ()).norm() <= rounding;
   };
   if (!has_form(k)) {
-    document.fail(
-        what +
-        (has_form(k.transpose()) ? " is transposed, as MATLAB has it" : " is no camera matrix") +
-        "; write its rows as fx, skew, cx, then 0, fy, cy, then 0, 0, 1.");
+    document.fail(what + (has_form(k.transpose()) ? " is transposed, as MATLAB has it"
+                                                  : " is no camera matrix"),
+                  "write its rows as fx, skew, cx, then 0, fy, cy, then 0, 0, 1");
   }
   camera.fx = k(0, 0);
   camera.skew = k(0, 1);
@@ -442,28 +448,25 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
   try {
     const Storage storage(document);
     if (storage.matrix(first_matrix).empty()) {
-      document.fail(
-          "It has no camera matrix (K1 or M1, K or camera_matrix); one file must hold both, their "
-          "distortions, R and T.");
+      document.fail("It has no camera matrix (K1 or M1, K or camera_matrix)",
+                    "one file must hold both, their distortions, R and T");
     }
     const cv::Size in_file = storage.image_size();
     const cv::Size size = in_file.empty() ? image_size : in_file;
     if (size.empty()) {
-      document.fail(
-          "It holds no image size, so that it only does where images are given; add image_width "
-          "and image_height.");
+      document.fail("It holds no image size, so that it only does where images are given",
+                    "add image_width and image_height");
     }
     if (!in_file.empty() && !image_size.empty() && in_file != image_size) {
       document.fail("It is for images of " + size_text(in_file.width, in_file.height) +
-                    " pixels, the given ones have " +
-                    size_text(image_size.width, image_size.height) +
-                    "; `calibration convert --scale` makes a calibration for reduced images.");
+                        " pixels, the given ones have " +
+                        size_text(image_size.width, image_size.height),
+                    "`calibration convert --scale` makes a calibration for reduced images");
     }
     require_known_xi(document, storage);
     if (!storage.matrix(third_matrix).empty()) {
-      document.fail(
-          "It has three cameras, but R and T are those of two; give two, or a rig of more as a "
-          "Kalibr camchain.");
+      document.fail("It has three cameras, but R and T are those of two",
+                    "give two, or a rig of more as a Kalibr camchain");
     }
     Rig rig;
     rig.views.resize(2);
@@ -473,7 +476,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         read_camera(document, storage, {"cam0", first_matrix, first_distortion, first_xi}, size);
     if (storage.matrix(second_matrix).empty()) {
       if (!storage.matrix(second_xi).empty()) {
-        document.fail("It has the second camera's xi without its matrix (K2); add it.");
+        document.fail("It has the second camera's xi without its matrix (K2)", "add it");
       }
       rig.views.pop_back();
       if (in_file.empty()) require_centre(document, rig.views[0]);
@@ -484,7 +487,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         read_camera(document, storage, {"cam1", second_matrix, second_distortion, second_xi}, size);
     if ((rig.views[0].camera.model == CameraModel::mei) !=
         (rig.views[1].camera.model == CameraModel::mei)) {
-      document.fail("It has a xi of one camera alone; add the other's (xi1, xi2), or remove it.");
+      document.fail("It has a xi of one camera alone", "add the other's (xi1, xi2), or remove it");
     }
     if (in_file.empty()) {
       for (const View& view : rig.views) require_centre(document, view);
@@ -493,10 +496,10 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
     limit_fields_of_view(rig, document, storage);
     return rig;
   } catch (const cv::Exception& error) {
-    document.fail("OpenCV cannot read it (" + error.err + ").");
+    document.fail("OpenCV cannot read it (" + error.err + ")", "correct it there");
   } catch (const std::logic_error& error) {
     // What its parsers do with texts that they do not foresee, such as keys without a name.
-    document.fail(std::string("OpenCV cannot read it (") + error.what() + ").");
+    document.fail(std::string("OpenCV cannot read it (") + error.what() + ")", "correct it there");
   }
 }
 

@@ -26,8 +26,8 @@ Camera read_camera(const Document& document, const YamlCamera& keys, const std::
                         std::array{number_or_zero("k1"), number_or_zero("k2"), number_or_zero("p1"),
                                    number_or_zero("p2"), number_or_zero("k3")});
   } else if (type != "Rectified") {
-    document.fail("The Camera.type \"" + type +
-                  "\" is unknown; use KannalaBrandt8, PinHole or Rectified.");
+    document.fail("The Camera.type \"" + type + "\" is unknown",
+                  "use KannalaBrandt8, PinHole or Rectified");
   }
   camera.width = keys.side("Camera.width");
   camera.height = keys.side("Camera.height");
@@ -54,8 +54,8 @@ Rig read_orb_slam(const Document& document) {
     const YamlCamera keys(document, "ORB-SLAM3", root);
     if (keys.has("LEFT.K")) {
       document.fail(
-          "Its cameras are those of images that ORB-SLAM rectifies (LEFT.K); give the calibration "
-          "of the images themselves, or Camera1, Camera2 and Stereo.T_c1_c2.");
+          "Its cameras are those of images that ORB-SLAM rectifies (LEFT.K)",
+          "give the calibration of the images themselves, or Camera1, Camera2 and Stereo.T_c1_c2");
     }
     View& first = rig.views.emplace_back();
     first.name = "cam0";

@@ -24,7 +24,9 @@
 namespace widestereo {
 namespace calibration {
 
-void Document::fail(const std::string& what) const { throw Error(path.string() + ": " + what); }
+void Document::fail(const std::string& finding, const std::string& remedy) const {
+  throw Error(path.string() + ": " + finding + "; " + remedy + ".");
+}
 
 void set_unified_from_alpha(Camera& camera, double alpha) {
   camera.model = CameraModel::unified;
@@ -82,22 +84,18 @@ void require_last_row(const Document& document, const std::string& what,
                       const Eigen::RowVector4d& row) {
   const Eigen::RowVector4d expected(0, 0, 0, 1);
   if (((row - expected).array().abs() <= 1e-6).all()) return;
-  document.fail(what +
-                " must end with the row 0 0 0 1; it may be transposed, as MATLAB and OpenGL have "
-                "it.");
+  document.fail(what + " must end with the row 0 0 0 1",
+                "it may be transposed, as MATLAB and OpenGL have it");
 }
 
 Eigen::Isometry3d rigid(const Document& document, const std::string& what,
                         const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
-  if (!rotation.allFinite() || !translation.allFinite() || !is_rotation(rotation)) {
-    document.fail(what +
-                  " is not a rigid motion; its rotation must be orthonormal with determinant +1 "
-                  "and all numbers finite.");
-  }
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  motion.linear() = rotation;
+  motion.translation() = translation;
+  require_rigid(motion, document.path.string() + ": " + what);
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   motion.linear() = svd.matrixU() * svd.matrixV().transpose();
-  motion.translation() = translation;
   return motion;
 }
 
@@ -142,7 +140,7 @@ Document load(const std::filesystem::path& path) {
   const bool is_file = type == std::filesystem::file_type::regular;
   if (is_file && is_too_large(path)) {
     throw Error(path.string() + " is too large for a calibration file (" +
-                std::to_string(largest_mebibytes) + " MiB).");
+                std::to_string(largest_mebibytes) + " MiB); give one with its cameras alone.");
   }
   if (is_sfm_model(path)) {
     throw Error(path.string() +
@@ -185,7 +183,7 @@ std::vector<Document> ros_documents(const std::filesystem::path& folder) {
 
 CalibrationFormat format_of(const Document& document) {
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
-  if (first == std::string::npos) document.fail("The file is empty; give a calibration file.");
+  if (first == std::string::npos) document.fail("The file is empty", "give a calibration file");
   if (is_ocam(document)) return CalibrationFormat::ocam;
   if (is_multicol(document)) return CalibrationFormat::multicol;
   if (is_omnimvs(document)) return CalibrationFormat::omnimvs;
@@ -212,10 +210,10 @@ CalibrationFormat format_of(const Document& document) {
   if (document.contains("camera_model")) return CalibrationFormat::kalibr;
   if (has_opencv_matrix(document)) return CalibrationFormat::opencv;
   document.fail(
-      "This is no calibration that can be read; use a Kalibr camchain (YAML), a Basalt calibration "
-      "(JSON), an OpenCV FileStorage, EuRoC's sensor.yaml, a camera of CamOdoCal, OCamCalib or "
-      "WoodScape, a camera_info of ROS, or a rig of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM "
-      "or DepthAI.");
+      "This is no calibration that can be read",
+      "use a Kalibr camchain (YAML), a Basalt calibration (JSON), an OpenCV FileStorage, EuRoC's "
+      "sensor.yaml, a camera of CamOdoCal, OCamCalib or WoodScape, a camera_info of ROS, or a rig "
+      "of VINS-Fusion, ORB-SLAM3, OmniMVS, MultiCol-SLAM or DepthAI");
 }
 
 }  // namespace

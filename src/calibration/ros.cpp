@@ -28,8 +28,8 @@ void set_lens(Camera& camera, const Document& document, const YamlCamera& keys) 
   } else if (model == "plumb_bob" || model == "rational_polynomial") {
     camera = rational_camera(document, key, keys.numbers(key));
   } else {
-    document.fail("The distortion_model \"" + model +
-                  "\" is unknown; use equidistant, plumb_bob or rational_polynomial.");
+    document.fail("The distortion_model \"" + model + "\" is unknown",
+                  "use equidistant, plumb_bob or rational_polynomial");
   }
 }
 
@@ -38,8 +38,8 @@ void require_whole_images(const Document& document, const YamlCamera& keys, cons
                           const Camera& camera) {
   for (const char* key : {"binning_x", "binning_y"}) {
     if (keys.has(key) && keys.number(key) > 1) {
-      document.fail(std::string("Its images are binned (") + key +
-                    "); set it to 0 and scale by `calibration convert --scale`.");
+      document.fail(std::string("Its images are binned (") + key + ")",
+                    "set it to 0 and scale by `calibration convert --scale`");
     }
   }
   if (!keys.has("roi")) return;
@@ -49,8 +49,8 @@ void require_whole_images(const Document& document, const YamlCamera& keys, cons
       {"x_offset", 0}, {"y_offset", 0}, {"width", camera.width}, {"height", camera.height}};
   for (const auto& [key, size] : whole) {
     if (!roi.has(key) || roi.number(key) == 0 || roi.number(key) == size) continue;
-    document.fail(std::string("Its images are a part of what was calibrated (roi: ") + key +
-                  "); move the centre in K, set width and height to theirs, and roi to 0.");
+    document.fail(std::string("Its images are a part of what was calibrated (roi: ") + key + ")",
+                  "move the centre in K, set width and height to theirs, and roi to 0");
   }
 }
 
@@ -105,8 +105,8 @@ Rig read_ros(const std::vector<Document>& documents) {
       view.world_from_camera = first.inverse() * rectified_from_camera;
       for (const View& other : rig.views) {
         if (other.world_from_camera.translation() != view.world_from_camera.translation()) continue;
-        document.fail("It has no baseline to " + other.name +
-                      " in its projection matrix; calibrate both together, as a stereo pair.");
+        document.fail("It has no baseline to " + other.name + " in its projection matrix",
+                      "calibrate both together, as a stereo pair");
       }
       rig.views.push_back(std::move(view));
     });

@@ -36,7 +36,7 @@ void require_single_keys(const Document& document, const YAML::Node& map,
   for (const auto& entry : map) {
     const YAML::Node& key = entry.first;
     if (!key.IsScalar() || keys.insert(key.Scalar()).second) continue;
-    document.fail(where + "The key " + key.Scalar() + " is there twice; leave one.");
+    document.fail(where + "The key " + key.Scalar() + " is there twice", "leave one");
   }
 }
 
@@ -46,33 +46,40 @@ void read_yaml(const Document& document, const std::function<void(const YAML::No
   try {
     const YAML::Node root = YAML::Load(as_yaml(document.text));
     if (!root.IsMap()) {
-      document.fail("It holds no keys such as cam0 or camera_model; is it a calibration?");
+      document.fail("It holds no keys such as cam0 or camera_model", "give a calibration");
     }
     require_single_keys(document, root, "");
     read(root);
   } catch (const YAML::Exception& error) {
-    document.fail(std::string("It is not valid YAML (") + error.what() + ").");
+    document.fail(std::string("It is not valid YAML (") + error.what() + ")", "correct it there");
   }
 }
 
 YamlCamera::YamlCamera(const Document& document, const std::string& name, const YAML::Node& node)
     : document_(document), name_(name), node_(node) {
-  if (!node || !node.IsMap()) fail("It must hold keys such as camera_model and intrinsics.");
+  if (!node || !node.IsMap())
+    fail("It must hold keys such as camera_model and intrinsics", "add them");
   require_single_keys(document, node, name + ": ");
 }
 
-void YamlCamera::fail(const std::string& what) const { document_.fail(name_ + ": " + what); }
+void YamlCamera::fail(const std::string& finding, const std::string& remedy) const {
+  document_.fail(name_ + ": " + finding, remedy);
+}
+
+void YamlCamera::fail_without(const std::string& key) const {
+  fail("The key " + key + " is missing", "add it");
+}
 
 bool YamlCamera::has(const char* key) const { return static_cast<bool>(node_[key]); }
 
 std::string YamlCamera::text(const char* key, const char* otherwise) const {
   if (!has(key) && otherwise != nullptr) return otherwise;
-  if (!has(key) || !node_[key].IsScalar()) fail(std::string("The key ") + key + " is missing.");
+  if (!has(key) || !node_[key].IsScalar()) fail_without(key);
   return node_[key].Scalar();
 }
 
 double YamlCamera::number(const char* key) const {
-  if (!has(key)) fail(std::string("The key ") + key + " is missing.");
+  if (!has(key)) fail_without(key);
   return number(node_[key], key);
 }
 
@@ -80,7 +87,7 @@ int YamlCamera::count(const char* key) const {
   constexpr int most = 100;
   const std::optional<int> value = whole_number(number(key));
   if (!value || *value > most) {
-    fail(std::string("The key ") + key + " must be a whole number from 1 to 100.");
+    fail(std::string("The key ") + key + " must be a whole number from 1 to 100", "correct it");
   }
   return *value;
 }
@@ -88,8 +95,8 @@ int YamlCamera::count(const char* key) const {
 int YamlCamera::side(double value, const char* key) const {
   const std::optional<int> pixels = whole_number(value);
   if (!pixels) {
-    fail(std::string("The key ") + key + " has " + text_of(value) +
-         "; give whole numbers of pixels, at most a million.");
+    fail(std::string("The key ") + key + " has " + text_of(value),
+         "give whole numbers of pixels, at most a million");
   }
   return *pixels;
 }
@@ -106,7 +113,8 @@ double YamlCamera::number(const YAML::Node& node, const char* key) const {
   const std::optional<double> value =
       node.IsScalar() ? number_of(node.Scalar()) : std::optional<double>();
   if (!value) {
-    fail(std::string("The key ") + key + " holds something that is not a finite number.");
+    fail(std::string("The key ") + key + " holds something that is not a finite number",
+         "correct it");
   }
   return *value;
 }
@@ -125,7 +133,8 @@ YAML::Node YamlCamera::list(const char* key) const {
 
 std::vector<double> YamlCamera::numbers(const char* key) const {
   const YAML::Node values = list(key);
-  if (!values.IsSequence()) fail(std::string("The key ") + key + " must list numbers.");
+  if (!values.IsSequence())
+    fail(std::string("The key ") + key + " must list numbers", "correct it");
   return numbers(values, key);
 }
 
@@ -133,14 +142,15 @@ std::vector<double> YamlCamera::numbers(const char* key, std::size_t count) cons
   const YAML::Node of_key = list(key);
   if (count == 0 && has(key) && node_[key].IsNull()) return {};
   if (!of_key.IsSequence() || of_key.size() < count) {
-    fail(std::string("The key ") + key + " must list " + std::to_string(count) + " numbers.");
+    fail(std::string("The key ") + key + " must list " + std::to_string(count) + " numbers",
+         "correct it");
   }
   std::vector<double> values = numbers(of_key, key);
   if (std::any_of(values.begin() + static_cast<long>(count), values.end(),
                   [](double value) { return value != 0; })) {
     fail(std::string("The key ") + key + " lists " + std::to_string(values.size()) +
-         " numbers, but with these models it has " + std::to_string(count) +
-         "; correct the numbers or the models.");
+             " numbers, but with these models it has " + std::to_string(count),
+         "correct the numbers or the models");
   }
   values.resize(count);
   return values;
@@ -151,7 +161,7 @@ std::vector<double> YamlCamera::rows(const YAML::Node& list, std::size_t columns
   std::vector<double> values;
   for (const YAML::Node& row : list) {
     if (!row.IsSequence() || row.size() != columns) {
-      fail(std::string("The key ") + key + " must be " + shape + ".");
+      fail(std::string("The key ") + key + " must be " + shape, "correct it");
     }
     const std::vector<double> of_row = numbers(row, key);
     values.insert(values.end(), of_row.begin(), of_row.end());
@@ -162,7 +172,7 @@ std::vector<double> YamlCamera::rows(const YAML::Node& list, std::size_t columns
 Eigen::Matrix3d YamlCamera::matrix(const char* key) const {
   const YAML::Node node = node_[key];
   if (!node || !node.IsSequence() || node.size() != 3) {
-    fail(std::string("The key ") + key + " (3x3 matrix, three rows) is missing.");
+    fail_without(std::string(key) + " (3x3 matrix, three rows)");
   }
   const std::vector<double> values = rows(node, 3, key, "a 3x3 matrix");
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(values.data());
@@ -176,10 +186,10 @@ Eigen::Isometry3d YamlCamera::motion(const char* key) const {
   } else if (node && node.IsSequence() && node.size() >= 3) {
     values = rows(node, 4, key, "a 4x4 matrix");
   } else {
-    fail(std::string("The key ") + key + " (4x4 matrix, four rows) is missing.");
+    fail_without(std::string(key) + " (4x4 matrix, four rows)");
   }
   if (values.size() != 12 && values.size() != 16) {
-    fail(std::string("The key ") + key + " must be a 4x4 matrix.");
+    fail(std::string("The key ") + key + " must be a 4x4 matrix", "correct it");
   }
   if (values.size() == 16) {
     require_last_row(document_, name_ + ": " + key,
@@ -232,8 +242,8 @@ void YamlCamera::set_projection(Camera& camera) const {
     camera = whole_sphere(camera.width, camera.height);
     if (has("intrinsics")) intrinsics(0);
   } else {
-    fail("The camera_model \"" + model +
-         "\" is unknown; use pinhole, omni, eucm, ds or equirectangular.");
+    fail("The camera_model \"" + model + "\" is unknown",
+         "use pinhole, omni, eucm, ds or equirectangular");
   }
 }
 
@@ -250,9 +260,9 @@ void YamlCamera::set_distortion(Camera& camera) const {
   }
   const auto unsupported = [&] {
     fail("The distortion_model \"" + model + "\" does not go with camera_model \"" +
-         text("camera_model") +
-         "\" here; use radtan, equidistant, fov or none with "
-         "pinhole, radtan or none with omni, and none with eucm, ds and equirectangular.");
+             text("camera_model") + "\" here",
+         "use radtan, equidistant, fov or none with pinhole, radtan or none with omni, and none "
+         "with eucm, ds and equirectangular");
   };
   if (model == "radtan" && (pinhole || camera.model == CameraModel::unified)) {
     const std::vector<double> d = numbers(coefficients, 4);

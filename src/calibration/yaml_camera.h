@@ -44,7 +44,9 @@ class YamlCamera {
   Eigen::Matrix3d matrix(const char* key) const;
 
  private:
-  [[noreturn]] void fail(const std::string& what) const;
+  [[noreturn]] void fail(const std::string& finding, const std::string& remedy) const;
+  /// That it is not there.
+  [[noreturn]] void fail_without(const std::string& key) const;
   int side(double value, const char* key) const;
   /// A list of that key, also one that is the data of a matrix; null if there is none.
   YAML::Node list(const char* key) const;

@@ -34,13 +34,14 @@ void require_finite(const Camera& c, const std::string& name) {
   check("max_theta", c.max_theta);
 }
 
-}  // namespace
-
+/// But for entries rounded to four digits.
 bool is_rotation(const Eigen::Matrix3d& matrix) {
   constexpr double rounding = 3.1e-4;  // 2 * 3 * 0.5e-4, and what is of second order
   return (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).norm() <= rounding &&
          matrix.determinant() > 0;
 }
+
+}  // namespace
 
 void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
   if (pose.matrix().allFinite() && is_rotation(pose.linear())) return;

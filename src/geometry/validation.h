@@ -12,9 +12,6 @@ namespace widestereo {
 /// Width and height of a camera's image at most, pixels.
 inline constexpr int largest_image_side = 16384;
 
-/// Whether a matrix is a rotation, but for entries rounded to four digits.
-bool is_rotation(const Eigen::Matrix3d& matrix);
-
 /// The unit quaternion that one read from a file is, but for rounding. Throws Error where its
 /// length is not 1 within 1 %. `name`, what has it, begins the message, and `remedy` ends it: a
 /// clause.

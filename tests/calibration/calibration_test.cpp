@@ -1184,7 +1184,7 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
            "cam0: T_cam_imu must end with the row 0 0 0 1; it may be transposed");
   }
   expect(replaced(with_imu("cam0", "T_cam_imu"), "[1.0, 0.0, 0.0, -0.04]", "[1.1, 0.0, 0.0, 0.0]"),
-         "cam0: T_cam_imu is not a rigid motion");
+         "cam0: T_cam_imu: the pose is not a rigid motion");
   expect(replaced(with_imu("cam1", "T_imu_cam"), "-0.04", ".nan"), "cam1: The key T_imu_cam");
   expect(replaced(kalibr_text, "max_theta_deg: 97.5", "max_theta_deg: 400"), "max_theta");
   expect(replaced(kalibr_text, "256.89]", "256.89, 7]"),
@@ -1209,7 +1209,8 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect("{\"value0\": [", "JSON");
   expect(replaced(basalt_text, "\"ucm\"", "\"ocam\""), "ocam");
   expect(replaced(basalt_text, "\"alpha\": 0.6", "\"alpha\": 1.0"), "alpha");
-  expect(replaced(basalt_text, "\"fx\": 120.0", "\"fx\": \"120\""), "fx");
+  expect(replaced(basalt_text, "\"fx\": 120.0", "\"fx\": \"120\""),
+         "cam0: The number \"fx\" is missing; add it.");
   expect(replaced(basalt_text, "\"qw\": 1.0", "\"qw\": 2.0"),
          "T_imu_cam has a quaternion of length 2 instead of 1; scale qx, qy, qz and qw alike.");
   expect(replaced(basalt_text, "[512, 510], ", ""), "length");

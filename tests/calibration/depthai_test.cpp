@@ -137,7 +137,7 @@ TEST_F(DepthAi, WhatIsWrongIsOneSentence) {
   EXPECT_THAT(error(replaced("[[570.5, 0.0, 640.25], [0.0, 571.5, 400.75], [0.0, 0.0, 1.0]]",
                              "[[570.5, 0.0, 0.0], [0.0, 571.5, 0.0], [640.25, 400.75, 1.0]]")),
               HasSubstr("CAM_A: The intrinsicMatrix is transposed"));
-  EXPECT_THAT(error(replaced("[1, {", "[0, {")), HasSubstr("socket twice"));
+  EXPECT_THAT(error(replaced("[1, {", "[0, {")), HasSubstr("the socket of CAM_A twice"));
   EXPECT_THAT(error(replaced("[1, {", "[99, {")), HasSubstr("pairs of a socket"));
   EXPECT_THAT(error(replaced("\"x\": -3.75", "\"u\": -3.75")), HasSubstr("The key x is missing"));
   EXPECT_THAT(error(replaced("\"extrinsics\"", "\"others\"")),

@@ -131,6 +131,8 @@ TEST_F(OCam, WhatIsWrongWithAFileIsOneSentence) {
   EXPECT_THAT(error(replaced(ocamcalib, "1532 1600", "1532.5 1600")), HasSubstr("image size"));
   EXPECT_THAT(error(replaced(ocamcalib, "5 -392", "6 -392")), HasSubstr("as many coefficients"));
   EXPECT_THAT(error(replaced(ocamcalib, "756.215", "nan")), HasSubstr("\"nan\" is not a finite"));
+  EXPECT_THAT(error(replaced(ocamcalib, "756.215", std::string("7\0\x1b", 3))),
+              HasSubstr("\"7  \" is not a finite number; correct it."));
   EXPECT_THAT(error(replaced(ocamcalib, "-392.22", "0")), HasSubstr("other than 0"));
   EXPECT_THAT(error(replaced(ocamcalib, "1.00028 -0.03", "-1 -0.03")), HasSubstr("affine"));
   EXPECT_THAT(error(replaced(ocamcalib, "1.2707685e-03", "-1e9")), HasSubstr("no lens"));
