@@ -3,6 +3,8 @@
 
 // Pixels away at which the surroundings of a pixel are taken for a normal.
 #define SURROUNDINGS_RADIUS 3
+// Cosine of the angle between that normal and the ray up to which it faces neither way.
+#define LEAST_FACING 0.05f
 // Share of the range of inverse distance to either side of a point over which its movement is measured, and 0.5 divided
 // by it: compilers fold a quotient of two constants and a product, each in its own way, and round otherwise.
 #define VELOCITY_STEP 0.002f
@@ -110,7 +112,7 @@ FN vec3 surroundings_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) {
   }
   vec3 normal = cross(points[1] - points[0], points[3] - points[2]);
   float facing = dot(normal, ray);
-  if (abs(facing) <= 0.05f * length(normal)) return none;
+  if (abs(facing) <= LEAST_FACING * length(normal)) return none;
   return (dot(m, ray) / facing) * normal;
 }
 

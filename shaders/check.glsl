@@ -230,8 +230,8 @@ FN vec2 difference_from_nearest(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 m) 
   return nearest.y < UNKNOWN_DIFFERENCE ? nearest : nearest_of_others;
 }
 
-// False where the pixel has no plane; `difference` and `reasons` say so, too.
-FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
+// False where the pixel has no plane; `difference` and `reasons` say so, too. `limits`: as MatchParameters.check_limits.
+FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, vec4 limits, float largest_cost, OUT(Comparison) c) {
   vec4 usable_ray = ray_at(CONTEXT REFERENCE, pixel);
   c.ray = vec3(usable_ray.x, usable_ray.y, usable_ray.z);
   c.held = hypothesis_at(CONTEXT REFERENCE, pixel);
@@ -252,18 +252,17 @@ FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
   c.speed = speed_in_sources(CONTEXT pixel, c.ray, c.w);
   c.difference = difference_from_nearest(CONTEXT pixel, c.ray, m);
   c.support = support_of_surroundings(CONTEXT pixel, c.ray, c.w, c.speed);
-  vec4 limits = PARAMETERS.check_limits;
   float least_variance = PARAMETERS.patch_limits.x;
   if (least_variance > 0.0f && reference_variance(CONTEXT pixel) < least_variance) c.reasons |= REASON_NO_TEXTURE;
-  if (c.held.w > limits.z) c.reasons |= REASON_HIGH_COST;
-  if (c.speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.w) c.reasons |= REASON_LOW_PARALLAX;
+  if (c.held.w > largest_cost) c.reasons |= REASON_HIGH_COST;
+  if (c.speed * (PARAMETERS.range.w - PARAMETERS.range.z) < limits.z) c.reasons |= REASON_LOW_PARALLAX;
   if (c.w < PARAMETERS.patch_limits.z * length(m)) c.reasons |= REASON_TILT;
   if (c.difference.y >= UNKNOWN_DIFFERENCE) {
     c.reasons |= REASON_UNCHECKED;
   } else if (c.difference.x > limits.x || c.difference.y > limits.y) {
     c.reasons |= REASON_INCONSISTENT;
   }
-  if (c.support.x < PARAMETERS.patch_limits.w) c.reasons |= REASON_SPECKLE;
+  if (c.support.x < limits.w) c.reasons |= REASON_SPECKLE;
   return true;
 }
 
@@ -272,7 +271,7 @@ FN bool compare_with_others(CONTEXT_ARGUMENT ivec2 pixel, OUT(Comparison) c) {
 FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   Comparison c;
   float confidence = 0.0f;
-  if (compare_with_others(CONTEXT pixel, c)) {
+  if (compare_with_others(CONTEXT pixel, PARAMETERS.check_limits, PARAMETERS.acceptance.y, c)) {
     Indications i;
     i.spread = suspicion_of_spread(CONTEXT pixel, c.ray, c.w, c.speed);
     i.displacement = c.difference.y >= UNKNOWN_DIFFERENCE ? UNCHECKED_DISPLACEMENT : c.difference.y;
@@ -290,13 +289,13 @@ FN void check_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
 }
 
 // Stores what a vote asks for: the source that tells most (agreeing_source()), the displacement, what that source shows of
-// the point, and the reasons, of which an image that contradicts the plane is one, whatever cost is accepted.
+// the point, and the reasons, of which an image that contradicts the plane is one. Whatever is accepted in the end, planes
+// are the same.
 FN void check_for_vote_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   Comparison c;
   float source = 0.0f;
   float intensity = MASKED_INTENSITY;
-  if (compare_with_others(CONTEXT pixel, c)) {
-    if (c.held.w > NO_INFORMATION_COST) c.reasons |= REASON_HIGH_COST;
+  if (compare_with_others(CONTEXT pixel, PARAMETERS.repair_limits, NO_INFORMATION_COST, c)) {
     vec2 velocity;
     int agreeing = agreeing_source(CONTEXT pixel, c.ray, vec3(c.held.x, c.held.y, c.held.z), velocity);
     source = float(agreeing);

@@ -120,7 +120,7 @@ FN void adopt_fill_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   vec3 m = vec3(plane.x, plane.y, plane.z);
   float cost = min(patch_cost(CONTEXT pixel, m), NO_INFORMATION_COST);
   vec4 checked = check_at(CONTEXT REFERENCE, pixel);
-  bool agrees = (PASS.candidates & FILL_WITH_MATCHES) != 0u && checked.y <= PARAMETERS.check_limits.y;
+  bool agrees = (PASS.candidates & FILL_WITH_MATCHES) != 0u && checked.y <= PARAMETERS.repair_limits.y;
   if (agrees && cost > hypothesis_at(CONTEXT REFERENCE, pixel).w + LARGEST_EXTRA_COST) return;
   store_hypothesis(CONTEXT REFERENCE, pixel, vec4(m, cost));
   store_check(CONTEXT REFERENCE, pixel,

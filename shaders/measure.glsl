@@ -3,13 +3,19 @@
 
 // Variance (px^2) below which no measurement is believed.
 #define SMALLEST_VARIANCE 4e-4f
-// Square of the slopes that noise makes, in units of the variance that the match leaves unexplained: less than it is, as
-// at edges of surfaces more than noise is unexplained.
+// Square of the slopes that noise makes in the reference, in units of the variance that the match leaves unexplained: less
+// than it is, as at edges of surfaces more than noise is unexplained.
 #define NOISE_OF_SLOPES 0.25f
 // Share of a patch's information that is believed in any case.
 #define LEAST_SHARE 0.05f
 // Share of a match's variance that is the reference's noise, which the matches in all sources have in common.
 #define COMMON_SHARE 0.5f
+// Variance that a match leaves in any case, as of intensities of half precision.
+#define LEAST_RESIDUAL 1e-7f
+// Correlation up to which a patch matches nothing.
+#define NO_CORRELATION 0.05f
+// Squared sine of the angle between the images of a pixel's width and height up to which nothing is told across them.
+#define LEAST_SQUARED_SINE 2.5e-3f
 // Largest displacement from the source's own plane (px) that counts.
 #define LARGEST_DISPLACEMENT 5.0f
 
@@ -31,7 +37,8 @@ FN vec2 reference_direction(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 m, ve
   vec2 jx = 0.5f * (right - left);
   vec2 jy = 0.5f * (down - up);
   float determinant = jx.x * jy.y - jx.y * jy.x;
-  if (abs(determinant) < 0.05f) return along;
+  // By the angle alone: the source's pixels may be far larger or smaller.
+  if (!(determinant * determinant > LEAST_SQUARED_SINE * (dot(jx, jx) * dot(jy, jy)))) return along;
   return (1.0f / determinant) *
          vec2(jy.y * along.x - jy.x * along.y, jx.x * along.y - jx.y * along.x);
 }
@@ -58,7 +65,7 @@ FN bool slope_at(CONTEXT_ARGUMENT ivec2 q, vec2 direction, OUT(float) intensity,
 
 // Whether the source's own plane agrees with the pixel's, so that nothing hides the point there.
 FN bool agrees(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, vec3 m) {
-  return difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.check_limits.y;
+  return difference_from_source(CONTEXT source, pixel, ray, m).y <= PARAMETERS.repair_limits.y;
 }
 
 // The source that tells most of those whose own planes agree with the pixel's, for the point may be hidden in others; of
@@ -145,10 +152,11 @@ FN float variance_in_source(CONTEXT_ARGUMENT int source, ivec2 pixel, vec3 ray, 
   float least = LEAST_SHARE * information;
   float per_sample = g.n > 0.0f ? 1.0f / g.n : 0.0f;
   float spread = max((g.sum_squares - per_sample * g.sum * g.sum) * per_sample, 0.0f);
-  float residual = spread * held.w * (2.0f - held.w) + 1e-7f;
+  float residual = spread * held.w * (2.0f - held.w) + LEAST_RESIDUAL;
   float along_gain = products - per_sample * g.sum * slopes;
   information -= per_sample * (slopes * slopes + along_gain * along_gain / max(spread, 1e-9f));
-  information = max(information - NOISE_OF_SLOPES * g.n * residual, least);
+  // Slopes are those per pixel of the source, which has the same noise over a longer or shorter way.
+  information = max(information - NOISE_OF_SLOPES * g.n * residual * dot(direction, direction), least);
   // The checkerboard leaves out every other pixel, whose information is about the same.
   float correlation = 1.0f - held.w;
   information *= float(COLUMN_STEP) * correlation * correlation;
@@ -170,7 +178,7 @@ FN void measure_pixel(CONTEXT_ARGUMENT ivec2 pixel) {
   float speed = 0.0f;
   float variance = UNMEASURED_VARIANCE;
   float w = inverse_distance_of(held, ray);
-  if (is_usable(CONTEXT pixel, usable_ray) && 1.0f - held.w > 0.05f) {
+  if (is_usable(CONTEXT pixel, usable_ray) && 1.0f - held.w > NO_CORRELATION) {
     vec2 fastest;
     int chosen = agreeing_source(CONTEXT pixel, ray, m, fastest);
     // Not the product of roots, of which compilers take what they are of.

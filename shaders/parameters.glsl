@@ -116,10 +116,10 @@ struct ViewPair {
 // std140 uniform block.
 struct MatchParameters {
   vec4 range;         // min and max distance (m), min and max inverse distance (1/m)
-  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; smallest
-                      // support
-  vec4 check_limits;  // consistency: relative, pixels; largest cost; smallest parallax (pixels)
-  vec4 acceptance;    // smallest confidence; unused
+  vec4 patch_limits;  // texture: smallest variance; smallest visible share; cosine of the largest tilt; unused
+  vec4 check_limits;  // consistency: relative, pixels; smallest parallax (pixels); smallest support
+  vec4 acceptance;    // smallest confidence; largest cost; unused
+  vec4 repair_limits;  // as check_limits, of what is repaired and what counts as consistent until the last check
   ivec4 search;       // distance sampling, refinements, best sources; unused
   vec4 support;       // 1 / intensity scale of the patch's weights, of the regression's weights; margin of ambiguity;
                       // preference for far planes

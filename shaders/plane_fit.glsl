@@ -11,6 +11,11 @@
 // Inverse square of the displacement (px) from the pixel's plane at which a neighbour's own plane passes the pixel where
 // it weighs a quarter.
 #define PER_SQUARED_PASSING 16.0f
+// Information of slopes, as a share of the offset's, that the guess counts for: it decides slopes that the neighbourhood
+// leaves open.
+#define GUESS_SHARE 1e-3f
+// Of the product of both slopes' information, the least that their determinant must be.
+#define LEAST_DETERMINANT 1e-9f
 // First random slot; the search uses lower ones.
 #define REGRESSION_SLOT 64
 // Length of the tangent vectors, so that neighbouring rays have coordinates of order 1.
@@ -121,8 +126,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   fit.agreement = s / undoubted;
   float mx = sx / s;
   float my = sy / s;
-  // A weak pull towards the guess decides slopes that the neighbourhood leaves open.
-  float pull = 1e-3f * s;
+  float pull = GUESS_SHARE * s;
   float cxx = sxx - sx * mx + pull;
   float cxy = sxy - sx * my;
   float cyy = syy - sy * my + pull;
@@ -136,7 +140,7 @@ FN bool fit_plane(CONTEXT_ARGUMENT ivec2 pixel, vec3 ray, vec3 east, vec3 south,
   float cxr = unit * (sxr - sr * mx);
   float cyr = unit * (syr - sr * my);
   float determinant = cxx * cyy - cxy * cxy;
-  if (!(determinant > 1e-9f * cxx * cyy)) return false;
+  if (!(determinant > LEAST_DETERMINANT * cxx * cyy)) return false;
   float turn_x = (cyy * cxr - cxy * cyr) / determinant;
   float turn_y = (cxx * cyr - cxy * cxr) / determinant;
   fit.plane.slope_x = guess.slope_x + turn_x;

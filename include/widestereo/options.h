@@ -121,7 +121,8 @@ struct Options {
   bool subpixel_match = true;
   /// After each regression at full size, pixels that fail the checks take the plane of accepted
   /// ones up to this many pixels away, 0..10000; 0 = none do. Those that agree with another view to
-  /// consistency_pixels take it only where it matches about as well as their own.
+  /// a pixel take it only where it matches about as well as their own. Limits of checks (below)
+  /// decide what is accepted in the end; repair goes by their defaults.
   int repair_radius = 32;
   /// After that, every pixel takes the plane, of those around and its own of before the regression,
   /// for which the planes up to this many pixels away and likeness of intensity in the other view
@@ -157,7 +158,9 @@ struct Options {
   double min_texture = 0.5;  ///< grey levels (0..255): patches with a smaller standard deviation
                              ///< carry no information
   double min_visible = 0.6;  ///< share of the patch that must be seen in the source, 0.01..1
+  double max_tilt = 85;      ///< degrees between normal and viewing ray, 0..90
 
+  // Checks of the planes that were found, which leave the planes as they are.
   /// Left-right check: largest relative difference of distance, 0..999.
   double consistency_relative = 0.02;
   double consistency_pixels = 1.0;  ///< left-right check: largest displacement, pixels, 0..999
@@ -166,7 +169,6 @@ struct Options {
   double max_cost = 0.5;
   /// Pixels between min_distance and max_distance in the source view, 0..10000.
   double min_parallax = 0.5;
-  double max_tilt = 85;  ///< degrees between normal and viewing ray, 0..90; the search keeps to it
   /// Smallest share of the planes around (in 41x41 pixels) that put the pixel's point within a
   /// source pixel of its own place, 0..1; fewer are a speckle.
   double min_support = 0.1;

@@ -26,8 +26,8 @@ constexpr int all_neighbours = left_and_up | right_and_down;
 // The blocks are uploaded as they are: their layout must be std140 (parameters) and std430 (pass).
 static_assert(sizeof(kernel::CameraParameters) == 96);
 static_assert(sizeof(kernel::ViewPair) == 48);
-static_assert(offsetof(kernel::MatchParameters, cameras) == 112);
-static_assert(offsetof(kernel::MatchParameters, pairs) == 112 + 96 * MAX_VIEWS);
+static_assert(offsetof(kernel::MatchParameters, cameras) == 128);
+static_assert(offsetof(kernel::MatchParameters, pairs) == 128 + 96 * MAX_VIEWS);
 static_assert(sizeof(kernel::MatchParameters) <= 16384);  // every device's uniform range
 static_assert(sizeof(kernel::PassParameters) == 68);
 
@@ -45,11 +45,14 @@ kernel::MatchParameters match_parameters(const std::vector<View>& all, int image
   p.range = {single(options.min_distance), single(options.max_distance),
              single(1 / options.max_distance), single(1 / options.min_distance)};
   p.patch_limits = {single(std::pow(options.min_texture / 255, 2)), single(options.min_visible),
-                    single(std::cos(options.max_tilt * radians_per_degree)),
-                    single(options.min_support)};
-  p.check_limits = {single(options.consistency_relative), single(options.consistency_pixels),
-                    single(options.max_cost), single(options.min_parallax)};
-  p.acceptance = {single(options.min_confidence), 0, 0, 0};
+                    single(std::cos(options.max_tilt * radians_per_degree)), 0};
+  const auto limits = [&single](const Options& o) {
+    return kernel::vec4(single(o.consistency_relative), single(o.consistency_pixels),
+                        single(o.min_parallax), single(o.min_support));
+  };
+  p.check_limits = limits(options);
+  p.acceptance = {single(options.min_confidence), single(options.max_cost), 0, 0};
+  p.repair_limits = limits(Options());
   const auto inverse_scale = [](double grey_levels) {
     constexpr double most = 1e6;  // where all but equal intensities weigh nothing; never infinite
     return grey_levels > 0 ? static_cast<float>(std::min(255 / grey_levels, most)) : 0.0f;

@@ -271,19 +271,36 @@ TEST(Checks, ForAVoteTellWhatTheSourceShowsOfThePoint) {
   }
 }
 
-TEST(Checks, ForAVoteRepairWhatTheImagesContradictWhateverCostIsAccepted) {
-  Options options = wide_range();
-  const auto reasons_at_cost = [&options](float cost) {
-    AgreeingViews views(options);
+TEST(Checks, ForAVoteRepairWhatTheImagesContradict) {
+  const auto reasons_at_cost = [](float cost) {
+    AgreeingViews views(wide_range());
     views.fixture.view(0).hypotheses(48, 48)[3] = cost;
     kernel::cpu::check_for_vote_pixel(views.fixture.context(), ivec2(48, 48));
     return static_cast<int>(views.fixture.view(0).checks(48, 48)[3]);
   };
-  options.max_cost = 2;
   EXPECT_EQ(reasons_at_cost(0.99f), 0);
   EXPECT_EQ(reasons_at_cost(1.01f), REASON_HIGH_COST);
-  options.max_cost = 0.5;
-  EXPECT_EQ(reasons_at_cost(0.6f), REASON_HIGH_COST);
+}
+
+/// Who asks for fewer and better points gets these, not other planes.
+TEST(Checks, ForAVoteAreThoseOfAnyLimitsOfAcceptance) {
+  Options strict = wide_range();
+  strict.max_cost = 0.01;
+  strict.min_parallax = 1e4;
+  strict.consistency_relative = 1e-3;
+  strict.consistency_pixels = 1e-3;
+  strict.min_support = 1;
+  AgreeingViews views(strict);
+  KernelFixture& fixture = views.fixture;
+  fixture.view(0).hypotheses(44, 44) *= 3;
+  fixture.view(0).hypotheses(48, 48)[3] = 0.2f;
+  fixture.view(1).hypotheses *= 1.005;
+  for (cv::Vec4f& plane : fixture.view(1).hypotheses) plane[3] = 0;
+  EXPECT_EQ(views.reasons({48, 48}) &
+                (REASON_HIGH_COST | REASON_LOW_PARALLAX | REASON_INCONSISTENT | REASON_SPECKLE),
+            REASON_HIGH_COST | REASON_LOW_PARALLAX | REASON_INCONSISTENT | REASON_SPECKLE);
+  kernel::cpu::check_for_vote_pixel(fixture.context(), ivec2(48, 48));
+  EXPECT_EQ(fixture.view(0).checks(48, 48)[3], 0);
 }
 
 TEST(Checks, ASmallIslandIsASpeckleAndALargeOneIsNot) {

@@ -12,8 +12,7 @@ constexpr int step = 3;
 
 class Measure : public ::testing::Test {
  protected:
-  /// `roll`: of the source about its axis, radians.
-  explicit Measure(double roll = 0) : fixture_(rolled_rig(roll), wide_range("fast")) {
+  explicit Measure(const Rig& rig = fisheye_rig(size)) : fixture_(rig, wide_range("fast")) {
     const Eigen::Vector3d normal = Eigen::Vector3d(0.2, 0.1, 1).normalized();
     const double offset = 2;
     wall_ = normal / offset;
@@ -24,9 +23,12 @@ class Measure : public ::testing::Test {
     fixture_.set_reference(0);
   }
 
-  static Rig rolled_rig(double roll) {
+  /// `roll`: of the source about its axis, radians; `factor`: of its image's size.
+  static Rig changed_rig(double roll, double factor = 1) {
     Rig rig = fisheye_rig(size);
-    rig.views[1].world_from_camera.rotate(Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()));
+    View& source = rig.views[1];
+    source.world_from_camera.rotate(Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()));
+    source.camera = scaled(source.camera, factor);
     return rig;
   }
 
@@ -36,6 +38,17 @@ class Measure : public ::testing::Test {
     const cv::Mat masked = image < 0;
     image.convertTo(image, -1, gain, offset);
     image.setTo(MASKED_INTENSITY, masked);
+    fixture_.interpolate();
+  }
+
+  /// A gradient of brightness and noise (of full scale), instead of the wall.
+  void show_gradients(double noise) {
+    for (int i = 0; i < 2; ++i) {
+      cv::Mat image = fixture_.view(i).image();
+      const cv::Mat masked = image < 0;
+      gradient(image.size(), 0.003, 0.003, noise, i + 1).copyTo(image);
+      image.setTo(MASKED_INTENSITY, masked);
+    }
     fixture_.interpolate();
   }
 
@@ -102,7 +115,7 @@ class Measure : public ::testing::Test {
 
 class MeasureOfRolledCameras : public Measure, public ::testing::WithParamInterface<double> {
  protected:
-  MeasureOfRolledCameras() : Measure(GetParam()) {}
+  MeasureOfRolledCameras() : Measure(changed_rig(GetParam())) {}
 };
 
 INSTANTIATE_TEST_SUITE_P(Radians, MeasureOfRolledCameras, ::testing::Values(0, 1, -2));
@@ -133,14 +146,28 @@ TEST_F(Measure, GradientsOfBrightnessAndNoiseDetermineNoDistance) {
   EXPECT_LT(median_variance(), 0.04) << "texture does";
   // Gain and offset explain what a displacement does to a gradient.
   for (const auto& [noise, least] : {std::pair(0.0, 0.2), std::pair(0.004, 0.05)}) {
-    for (int i = 0; i < 2; ++i) {
-      cv::Mat image = fixture_.view(i).image();
-      const cv::Mat masked = image < 0;
-      gradient(image.size(), 0.003, 0.003, noise, i + 1).copyTo(image);
-      image.setTo(MASKED_INTENSITY, masked);
-    }
-    fixture_.interpolate();
+    show_gradients(noise);
     EXPECT_GT(median_variance(), least) << "noise " << noise;
+  }
+}
+
+/// The reference tells as much whatever the source's pixels are, in which the variance is counted.
+TEST(MeasureOfCoarserOrFinerSources, IsThatOfTheReferenceInTheirPixels) {
+  struct OfSource : Measure {
+    OfSource(double roll, double factor) : Measure(changed_rig(roll, factor)) {}
+    void TestBody() override {}
+    double variance() {
+      constexpr double noise = 0.004;
+      show_gradients(noise);
+      return median_variance() - static_cast<double>(SMALLEST_VARIANCE);
+    }
+  };
+  for (const double roll : {0.0, 1.0}) {
+    const double of_equal = OfSource(roll, 1).variance();
+    for (const double factor : {0.15, 0.5, 2.0}) {
+      EXPECT_NEAR(OfSource(roll, factor).variance() / (factor * factor), of_equal, 0.1 * of_equal)
+          << factor << " times the size, rolled by " << roll;
+    }
   }
 }
 
