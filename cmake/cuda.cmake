@@ -16,31 +16,34 @@ if(WIDESTEREO_CUDA)
   endif()
   include(CheckLanguage)
   check_language(CUDA)
+  set(least_cuda 11.8)
   # Asked first: older ones do not know the architectures, which enable_language() tries.
   set(nvcc_is_new_enough FALSE)
   if(CMAKE_CUDA_COMPILER)
     execute_process(COMMAND ${CMAKE_CUDA_COMPILER} --version OUTPUT_VARIABLE nvcc_version ERROR_QUIET)
-    if(NOT nvcc_version MATCHES "release ([0-9.]+)" OR CMAKE_MATCH_1 VERSION_GREATER_EQUAL 11.8)
+    # clang, which takes other options, has no release.
+    if(nvcc_version MATCHES "release ([0-9.]+)" AND CMAKE_MATCH_1 VERSION_GREATER_EQUAL ${least_cuda})
       set(nvcc_is_new_enough TRUE)
     endif()
   endif()
   if(nvcc_is_new_enough)
-    # Before CMake's own default: from Turing to Hopper, and later ones through PTX.
+    # Before CMake's own default: from Turing to Hopper, and later ones through PTX. So may Orin (8.7), for which machine
+    # code of other cards need not run.
     if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
-      set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 90-virtual CACHE STRING
+      set(CMAKE_CUDA_ARCHITECTURES 75-real 80 86-real 89-real 90 CACHE STRING
           "CUDA architectures")
     endif()
     enable_language(CUDA)
-    find_package(CUDAToolkit 11.8)
+    find_package(CUDAToolkit ${least_cuda})
   endif()
   if(nvcc_is_new_enough AND CUDAToolkit_FOUND)
     set(WIDESTEREO_HAS_CUDA TRUE)
     string(REPLACE ";" " " architectures "${CMAKE_CUDA_ARCHITECTURES}")
     set(cuda_summary "yes, toolkit ${CUDAToolkit_VERSION}, architectures ${architectures}")
   elseif(WIDESTEREO_CUDA STREQUAL "AUTO")
-    set(cuda_summary "no (no working nvcc of a CUDA toolkit of at least 11.8 found; CMAKE_CUDA_COMPILER may name one)")
+    set(cuda_summary "no (no working nvcc of a CUDA toolkit of at least ${least_cuda} found; CMAKE_CUDA_COMPILER may name one)")
   else()
-    message(FATAL_ERROR "WIDESTEREO_CUDA is ON, but no working nvcc of a CUDA toolkit of at least 11.8 was found; "
+    message(FATAL_ERROR "WIDESTEREO_CUDA is ON, but no working nvcc of a CUDA toolkit of at least ${least_cuda} was found; "
                         "install one or set CMAKE_CUDA_COMPILER to it.")
   endif()
 endif()

@@ -12,6 +12,7 @@
 #include "option_checks.h"
 #include "result_folders.h"
 #include "roofline.h"
+#include "say.h"
 #include "schedule/option_names.h"
 #include "text/formatted.h"
 #include "text/json_text.h"
@@ -108,6 +109,21 @@ void replace(ws::DevicePeaks& peaks, const ws::DevicePeaks& given) {
   if (given.gbps > 0) peaks.gbps = given.gbps;
 }
 
+/// All usable ones; says which others are not measured and why.
+std::vector<std::string> devices_that_open() {
+  std::vector<std::string> names;
+  for (const ws::DeviceInfo& device : ws::Device::list()) {
+    if (!device.unusable.empty()) continue;
+    try {
+      ws::Device::open(device.id);
+      names.push_back(device.id);
+    } catch (const ws::Error& error) {
+      say(device.id + " is left out: " + error.what());
+    }
+  }
+  return names;
+}
+
 void run_benchmark(BenchmarkArguments a) {
   require_one_device(a);
   if (!a.output.empty() && !a.plot.empty() && absolute_path(a.output) == absolute_path(a.plot)) {
@@ -116,11 +132,7 @@ void run_benchmark(BenchmarkArguments a) {
   for (const std::string& file : {a.output, a.plot}) {
     if (!file.empty()) ws::require_writable(file);
   }
-  if (a.devices.empty()) {
-    for (const ws::DeviceInfo& device : ws::Device::list()) {
-      if (device.unusable.empty()) a.devices.push_back(device.id);
-    }
-  }
+  if (a.devices.empty()) a.devices = devices_that_open();
   // What cannot be measured is refused before others take their time.
   for (const std::string& name : a.devices) {
     const ws::Device device = ws::Device::open(name);

@@ -52,7 +52,7 @@ const DeviceInfo* find(const std::vector<DeviceInfo>& devices, const Api& api,
   const std::string name_part = lower_case(wanted);
   std::string uuid = name_part;
   std::erase(uuid, '-');
-  if (uuid.starts_with("gpu")) uuid.erase(0, 3);  // as nvidia-smi writes it
+  if (uuid.starts_with("gpu") || uuid.starts_with("mig")) uuid.erase(0, 3);  // as nvidia-smi has it
   const auto first = [&devices](auto is_wanted) {
     const auto found = std::find_if(devices.begin(), devices.end(), is_wanted);
     return found == devices.end() ? nullptr : &*found;
@@ -78,6 +78,24 @@ std::unique_ptr<Device::Implementation> open_listed(const DeviceInfo& device,
   return open_cpu_device();
 }
 
+/// The first usable one that opens, as another process may have taken it; null where none does.
+/// `passed_over`: sentences about those before it, a space after each, which it is noted with.
+std::unique_ptr<Device::Implementation> open_first(const std::vector<DeviceInfo>& devices,
+                                                   const DeviceRequest& request,
+                                                   std::string& passed_over) {
+  for (const DeviceInfo& device : devices) {
+    if (!device.unusable.empty()) continue;
+    try {
+      auto implementation = open_listed(device, request);
+      implementation->note = passed_over;
+      return implementation;
+    } catch (const Error& error) {
+      passed_over += device.name + ": " + error.what() + " ";
+    }
+  }
+  return nullptr;
+}
+
 std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std::string& wanted,
                                                       const DeviceRequest& request) {
   const std::string name = api.name;
@@ -88,6 +106,12 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
   }
   std::stable_sort(devices.begin(), devices.end(),
                    [](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  if (wanted.empty() && devices.front().unusable.empty()) {
+    std::string passed_over;
+    auto implementation = open_first(devices, request, passed_over);
+    if (implementation != nullptr) return implementation;
+    throw Error(passed_over + "Or choose the device \"cpu\".");
+  }
   const DeviceInfo* device = find(devices, api, wanted);
   if (device == nullptr) {
     throw Error("No " + name + " device is called \"" + wanted +
@@ -115,27 +139,20 @@ std::string unusable_cuda_devices() {
 
 std::unique_ptr<Device::Implementation> open_best(const DeviceRequest& request) {
   std::string passed_over = unusable_cuda_devices();
+  std::vector<DeviceInfo> devices = Device::list();
+  std::erase_if(devices, [](const DeviceInfo& device) { return device.kind == DeviceKind::cpu; });
+  auto implementation = open_first(devices, request, passed_over);
+  if (implementation != nullptr) return implementation;
   bool any_vulkan = false;
-  for (const DeviceInfo& device : Device::list()) {
-    if (device.kind == DeviceKind::cpu) continue;
-    any_vulkan = any_vulkan || device.kind == DeviceKind::vulkan;
-    if (!device.unusable.empty()) {
-      if (device.kind != DeviceKind::cuda)
-        passed_over += device.name + ": " + device.unusable + " ";
-      continue;
-    }
-    try {
-      auto implementation = open_listed(device, request);
-      implementation->note = passed_over;
-      return implementation;
-    } catch (const Error& error) {
-      passed_over += device.name + ": " + error.what() + " ";
-    }
+  for (const DeviceInfo& device : devices) {
+    if (device.kind != DeviceKind::vulkan) continue;
+    any_vulkan = true;
+    if (!device.unusable.empty()) passed_over += device.name + ": " + device.unusable + " ";
   }
   if (!any_vulkan) {
     passed_over += "No Vulkan device: " + Device::why_none(DeviceKind::vulkan) + " ";
   }
-  auto implementation = open_cpu_device();
+  implementation = open_cpu_device();
   implementation->note = passed_over + "Using the CPU.";
   return implementation;
 }

@@ -296,9 +296,33 @@ TEST_F(CudaEmulation, DevicesAreFoundByIndexNameAndUuid) {
   std::string of_nvidia_smi = "GPU-" + devices[1].uuid;
   for (const std::size_t dash : {12, 17, 22, 27}) of_nvidia_smi.insert(dash, "-");
   EXPECT_EQ(Device::open("cuda:" + of_nvidia_smi).info().id, "cuda:1");
+  EXPECT_EQ(Device::open("cuda:MIG-" + of_nvidia_smi.substr(4)).info().id, "cuda:1");
   EXPECT_EQ(Device::open("auto").info().id, "cuda:0");
   EXPECT_EQ(Device::list().front().id, "cuda:0");
   EXPECT_THAT(error_of([] { Device::open("cuda:7"); }), HasSubstr("cuda:1 (Emulated GPU)"));
+}
+
+TEST_F(CudaEmulation, ADeviceThatIsTakenIsPassedOver) {
+  emulation().devices = 2;
+  int passed_over = 0;  // by whichever call finds the first one taken
+  for (int call = 0; call < 60; ++call) {
+    emulation().calls = 0;
+    emulation().failure = cudaErrorDevicesUnavailable;
+    emulation().failing_call = call;
+    for (const char* name : {"cuda", "auto"}) {
+      try {
+        const Device device = Device::open(name);
+        const bool says_why = device.note().find("it is busy") != std::string::npos;
+        passed_over += device.info().id == "cuda:1" && says_why ? 1 : 0;
+      } catch (const Error&) {
+        // Some calls are about all devices.
+      }
+    }
+  }
+  EXPECT_GE(passed_over, 4);
+  emulation().failing_call = -1;
+  emulation().compute_mode = cudaComputeModeProhibited;
+  EXPECT_THAT(error_of([] { Device::open("cuda"); }), HasSubstr("nvidia-smi"));
 }
 
 TEST_F(CudaEmulation, DigitsOfANameAreNoIndex) {
