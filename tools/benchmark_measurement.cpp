@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "roofline.h"
+#include "statistics/percentile.h"
 
 namespace ws = widestereo;
 using Json = nlohmann::ordered_json;
@@ -33,11 +34,8 @@ const ws::StereoResult& median_of(std::vector<ws::StereoResult>& results) {
 std::vector<ws::KernelTime> per_map(std::vector<ws::KernelTime> kernels, std::size_t maps) {
   const double share = 1.0 / static_cast<double>(maps);
   for (ws::KernelTime& kernel : kernels) {
-    ws::KernelWork& work = kernel.work;
-    for (double* sum :
-         {&kernel.milliseconds, &work.samples, &work.operations, &work.texels, &work.bytes}) {
-      *sum *= share;
-    }
+    kernel.milliseconds *= share;
+    kernel.work *= share;
   }
   return kernels;
 }
@@ -70,12 +68,7 @@ Json json_of(const ws::KernelWork& work, double milliseconds, const Roofline& le
 
 ws::KernelWork sum_of(const std::vector<ws::KernelTime>& kernels) {
   ws::KernelWork sum;
-  for (const ws::KernelTime& kernel : kernels) {
-    sum.samples += kernel.work.samples;
-    sum.operations += kernel.work.operations;
-    sum.texels += kernel.work.texels;
-    sum.bytes += kernel.work.bytes;
-  }
+  for (const ws::KernelTime& kernel : kernels) sum += kernel.work;
   return sum;
 }
 
@@ -95,7 +88,6 @@ Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::
   for (const ws::StereoResult& result : results) {
     wall.push_back(result.milliseconds / static_cast<double>(maps));
   }
-  std::sort(wall.begin(), wall.end());
   Measurement m;
   m.device = device.info();
   m.preset = options.preset;
@@ -103,10 +95,9 @@ Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::
   m.window_radius = options.window_radius;
   m.options = ws::to_json(options);
   m.filter = results.front().filter;
-  const std::size_t middle = wall.size() / 2;
-  m.wall = wall.size() % 2 == 1 ? wall[middle] : 0.5 * (wall[middle - 1] + wall[middle]);
-  m.wall_min = wall.front();
-  m.wall_max = wall.back();
+  m.wall_min = *std::min_element(wall.begin(), wall.end());
+  m.wall_max = *std::max_element(wall.begin(), wall.end());
+  m.wall = ws::median(std::move(wall));
   m.kernels = per_map(median_of(timed).times, maps);
   m.on_device = median_of(results).device_milliseconds / static_cast<double>(maps);
   m.device_bytes = results.front().device_bytes;

@@ -60,7 +60,8 @@ double field_of_view(const ws::Camera& camera, const Eigen::Vector2d& direction)
   const Eigen::Vector2d centre(std::clamp(camera.cx, 0.0, camera.width - 1.0),
                                std::clamp(camera.cy, 0.0, camera.height - 1.0));
   Eigen::Vector3d axis;
-  if (!unproject(camera, centre, axis)) return 0;
+  const ws::PreparedCamera prepared(camera);
+  if (!prepared.unproject(centre, axis)) return 0;
   double angle = 0;
   for (const double sign : {-1.0, 1.0}) {
     double reached = 0;
@@ -69,7 +70,7 @@ double field_of_view(const ws::Camera& camera, const Eigen::Vector2d& direction)
       Eigen::Vector3d ray;
       const bool inside = pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width - 1 &&
                           pixel.y() <= camera.height - 1;
-      if (!inside || !unproject(camera, pixel, ray)) break;
+      if (!inside || !prepared.unproject(pixel, ray)) break;
       reached = std::atan2(axis.cross(ray).norm(), axis.dot(ray));
     }
     angle += reached;

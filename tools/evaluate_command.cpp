@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -12,7 +13,6 @@
 #include "option_checks.h"
 #include "result_folder.h"
 #include "say.h"
-#include "text/number.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -60,10 +60,12 @@ int view_in_name(const fs::path& map, const fs::path& set) {
   const std::string stem = map.stem().string();
   for (const std::string name : {"distance_accepted", "distance"}) {
     if (!stem.starts_with(name)) continue;
-    const std::optional<double> view = ws::number_of(stem.substr(name.size()));
-    if (view && (set.empty() || fs::exists(set / ("depth" + stem.substr(name.size()) + ".tiff")))) {
-      return static_cast<int>(*view);
-    }
+    const std::string number = stem.substr(name.size());
+    int view = 0;
+    const char* end = number.data() + number.size();
+    const auto [rest, error] = std::from_chars(number.data(), end, view);
+    if (number.empty() || error != std::errc() || rest != end || view < 0) continue;
+    if (set.empty() || fs::exists(set / ("depth" + number + ".tiff"))) return view;
   }
   return 0;
 }

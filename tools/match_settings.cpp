@@ -6,6 +6,7 @@
 
 #include "option_checks.h"
 #include "schedule/option_names.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 
 using widestereo::Options;
@@ -47,7 +48,7 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
       ->capture_default_str()
       ->group(matching);
   const auto otherwise = [](double distance) {
-    return "; " + CLI::detail::to_string(distance) +
+    return "; " + widestereo::text_of(distance) +
            " unless the points of a COLMAP model or the demo's scene tell it";
   };
   command

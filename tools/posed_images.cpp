@@ -120,7 +120,7 @@ PosedImages PosedImageSettings::of_model() const {
   ws::Rig rig_of_all;
   for (std::size_t i = 0; i < model->names().size(); ++i) {
     posed.files.push_back(model->file_of(i, images));
-    rig_of_all.views.push_back(model->calibrated({i}).rig.views.front());
+    rig_of_all.views.push_back(model->view(i));
     all.push_back(i);
   }
   rig.limit_fields_of_view(rig_of_all);

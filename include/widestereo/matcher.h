@@ -83,6 +83,18 @@ struct KernelWork {
   double texels = 0;  ///< of source images that the samples blend, four each
   /// What moves to and from memory if every launch reads and writes each pixel of its maps once.
   double bytes = 0;
+
+  KernelWork& operator+=(const KernelWork& other) {
+    samples += other.samples;
+    operations += other.operations;
+    texels += other.texels;
+    bytes += other.bytes;
+    return *this;
+  }
+  KernelWork& operator*=(double factor) {
+    for (double* sum : {&samples, &operations, &texels, &bytes}) *sum *= factor;
+    return *this;
+  }
 };
 
 struct KernelTime {

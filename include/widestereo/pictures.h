@@ -9,15 +9,15 @@
 
 namespace widestereo {
 
-/// Distances (metres) at the two ends of a colour map.
+/// Distances (metres) at the two ends of a colour map, 0 < nearest < farthest.
 struct ColourRange {
   double nearest = 0;
   double farthest = 0;
 };
 
-/// The 2nd and 98th percentile of the inverse distances of a map (CV_32FC1, metres), as distances.
-/// This and all pictures of maps throw Error for other types than these, empty maps and different
-/// sizes.
+/// The 2nd and 98th percentile of the inverse distances of a map (CV_32FC1, metres), as distances;
+/// 1 to 10, which will do for any legend, where it has none. This and all pictures of maps throw
+/// Error for other types than these, empty maps, different sizes, and ranges that hold nothing.
 ColourRange robust_range(const cv::Mat& distance);
 
 /// All pictures are CV_8UC3 BGR of the map's size; pixels without a value are dark grey.
@@ -26,7 +26,7 @@ cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range);
 /// Normals (CV_32FC3: x right, y down, z forward, facing the camera) as red = (1 + x) / 2, green =
 /// (1 - y) / 2, blue = (1 - z) / 2: a wall that faces the camera is bluish, a floor green.
 cv::Mat normal_picture(const cv::Mat& normals);
-/// A map (CV_32FC1) between two values from dark to bright.
+/// A map (CV_32FC1) between two values, the lower one first, from dark to bright.
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high);
 /// Reason bits (CV_16UC1): the colour of filled pixels, else of the first bit set, the image (8 or
 /// 16 bit, grey, BGR or BGRA) where accepted.

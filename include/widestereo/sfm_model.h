@@ -57,6 +57,9 @@ class SfmModel {
   /// several. Throws Error where there is none.
   std::size_t image_of(const std::filesystem::path& file) const;
 
+  /// Calibration and pose of one image, validated, likewise named.
+  View view(std::size_t image) const;
+
   /// Calibration and poses of images, validated; views are named as the images are. The world frame
   /// and the unit of length are the reconstruction's: metres only where it was scaled to them.
   /// Pixel centres, at half pixels there, are moved to whole ones. Views have the masks that a

@@ -11,6 +11,7 @@
 #include "calibration/formats.h"
 #include "geometry/angle.h"
 #include "geometry/validation.h"
+#include "text/json_text.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -311,7 +312,7 @@ std::string basalt_text(const std::filesystem::path& path, const Rig& rig) {
   calibration::add_defaults(value);
   value[calibration::time_offset_key] = calibration::time_offset_form(rig, path);
   if (limited) value[calibration::max_theta_key] = limits;
-  return Json{{"value0", value}}.dump(2) + "\n";
+  return to_text(Json{{"value0", value}}) + "\n";
 }
 
 void write_basalt(const std::filesystem::path& path, const Rig& rig) {

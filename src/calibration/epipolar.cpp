@@ -15,6 +15,7 @@
 #include "geometry/validation.h"
 #include "io/intensity_range.h"
 #include "statistics/percentile.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
@@ -223,8 +224,8 @@ RangeReport check_range(const View& first, const View& second,
                         const std::vector<PixelMatch>& matches, double min_distance,
                         double max_distance) {
   if (!(min_distance > 0 && min_distance < max_distance)) {
-    throw Error("A range of distances from " + std::to_string(min_distance) + " to " +
-                std::to_string(max_distance) + " holds none; give 0 < min < max.");
+    throw Error("A range of distances from " + text_of(min_distance) + " to " +
+                text_of(max_distance) + " holds none; give 0 < min < max.");
   }
   constexpr double on_curve = 1;  // pixels
   const EpipolarGeometry geometry(first, second, "The check of the range");

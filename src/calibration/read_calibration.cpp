@@ -17,6 +17,7 @@
 #include "calibration/ros.h"
 #include "calibration/woodscape.h"
 #include "geometry/validation.h"
+#include "text/file_type.h"
 #include "text/text_input.h"
 #include "widestereo/error.h"
 #include "widestereo/sfm_model.h"
@@ -128,14 +129,9 @@ bool is_too_large(const std::filesystem::path& file) {
 }
 
 Document load(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::file_type type = std::filesystem::status(path, error).type();
+  const std::filesystem::file_type type = type_of(path);
   if (type == std::filesystem::file_type::not_found) {
     throw Error("There is no calibration file " + path.string() + "; check the path.");
-  }
-  if (type == std::filesystem::file_type::none) {
-    throw Error("Cannot read " + path.string() + " (" + error.message() +
-                "); check the permissions of its folder.");
   }
   const bool is_file = type == std::filesystem::file_type::regular;
   if (is_file && is_too_large(path)) {
@@ -149,6 +145,7 @@ Document load(const std::filesystem::path& path) {
   }
   require_no_part_of_a_model(path);
   if (type == std::filesystem::file_type::directory) {
+    std::error_code error;
     const std::filesystem::directory_iterator entries(path, error);
     if (error) {
       throw Error("Cannot read the folder " + path.string() + ": " + error.message() +

@@ -172,24 +172,29 @@ class SfmModel::Implementation {
                 "); give images that it has, in their folder.");
   }
 
-  CalibratedImages calibrated(const std::vector<std::size_t>& images) const {
-    CalibratedImages calibrated;
-    calibrated.in_metres = false;
-    for (const std::size_t number : images) {
-      const ColmapImage& image = image_at(number);
-      const auto camera = cameras_.find(image.camera);
-      if (camera == cameras_.end()) {
-        throw Error(cameras_file_.string() + " has no camera " + std::to_string(image.camera) +
-                    ", which took " + image.name + "; is the model complete?");
-      }
-      View& view = calibrated.rig.views.emplace_back();
-      view.name = names_[number];
-      view.camera = camera_of(camera->second, cameras_file_.string());
-      view.world_from_camera = image.camera_from_world.inverse();
-      if (image.mask.empty()) continue;
+  View view(std::size_t number) const {
+    const ColmapImage& image = image_at(number);
+    const auto camera = cameras_.find(image.camera);
+    if (camera == cameras_.end()) {
+      throw Error(cameras_file_.string() + " has no camera " + std::to_string(image.camera) +
+                  ", which took " + image.name + "; give the complete model.");
+    }
+    View view;
+    view.name = names_[number];
+    view.camera = camera_of(camera->second, cameras_file_.string());
+    view.world_from_camera = image.camera_from_world.inverse();
+    if (!image.mask.empty()) {
       view.mask = read_mask(image.mask);
       require_mask_size(view.mask, view, image.mask.string());
     }
+    require_valid(view, path_.string());
+    return view;
+  }
+
+  CalibratedImages calibrated(const std::vector<std::size_t>& images) const {
+    CalibratedImages calibrated;
+    calibrated.in_metres = false;
+    for (const std::size_t number : images) calibrated.rig.views.push_back(view(number));
     validate(calibrated.rig, path_.string());
     calibrated.distances = distances(images);
     return calibrated;
@@ -295,6 +300,8 @@ fs::path SfmModel::file_of(std::size_t image, const fs::path& folder) const {
 std::size_t SfmModel::image_of(const fs::path& file) const {
   return implementation_->image_of(file);
 }
+
+View SfmModel::view(std::size_t image) const { return implementation_->view(image); }
 
 CalibratedImages SfmModel::calibrated(const std::vector<std::size_t>& images) const {
   return implementation_->calibrated(images);

@@ -14,6 +14,7 @@
 #include "geometry/angle.h"
 #include "geometry/distance.h"
 #include "geometry/validation.h"
+#include "statistics/percentile.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 
@@ -184,16 +185,6 @@ bool is_right(const Sample& sample) { return sample.displacement <= right_pixels
 /// What no pixel tells.
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-/// The mean of the two middle values of an even number, as scores are usually given; percentile()
-/// takes the lower.
-double median_of(std::vector<double> values) {
-  if (values.empty()) return unknown;
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
-
 double mean_of(const std::vector<double>& values) {
   if (values.empty()) return unknown;
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -239,13 +230,13 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
     scores.completeness =
         static_cast<double>(relative.size()) / static_cast<double>(samples.size());
   }
-  scores.median_pixels = median_of(displacement);
+  scores.median_pixels = median(displacement);
   scores.mean_absolute = mean_of(absolute);
-  scores.median_absolute = median_of(absolute);
-  scores.median_relative = median_of(relative);
+  scores.median_absolute = median(absolute);
+  scores.median_relative = median(relative);
   scores.root_mean_square = std::sqrt(mean_of(squares));
   scores.mean_normal_angle = mean_of(angle);
-  scores.median_normal_angle = median_of(angle);
+  scores.median_normal_angle = median(angle);
   return scores;
 }
 

@@ -11,6 +11,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "geometry/camera_parameters.h"
+#include "geometry/camera_scale.h"
 #include "geometry/dual.h"
 #include "geometry/validation.h"
 #include "text/number.h"
@@ -344,12 +345,7 @@ Camera scaled_apart(const Camera& camera, double sx, double sy, int width, int h
   Camera result = camera;
   result.width = width;
   result.height = height;
-  result.fx *= sx;
-  result.fy *= sy;
-  result.skew *= sx;
-  result.shear *= sy;
-  result.cx = sx * (camera.cx + 0.5) - 0.5;
-  result.cy = sy * (camera.cy + 0.5) - 0.5;
+  scale_intrinsics(result, sx, sy);
   return result;
 }
 

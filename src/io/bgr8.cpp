@@ -3,18 +3,35 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "geometry/validation.h"
 #include "widestereo/error.h"
 
 namespace widestereo {
 
+namespace {
+
+void require_depth(bool good, const cv::Mat& image, const std::string& name,
+                   const std::string& depths) {
+  require_pixels(image, name);
+  const int channels = image.channels();
+  if (good && (channels == 1 || channels == 3 || channels == 4)) return;
+  throw Error(name + " is " + cv::typeToString(image.type()) + "; give " + depths +
+              ", grey, BGR or BGRA.");
+}
+
+bool is_integer_image(const cv::Mat& image) {
+  return image.depth() == CV_8U || image.depth() == CV_16U;
+}
+
+}  // namespace
+
 void require_image(const cv::Mat& image, const std::string& name) {
-  if (image.empty()) throw Error(name + " is empty; give one that has pixels.");
-  const int depth = image.depth(), channels = image.channels();
-  if ((depth == CV_8U || depth == CV_16U) && (channels == 1 || channels == 3 || channels == 4)) {
-    return;
-  }
-  throw Error(name + " is " + cv::typeToString(image.type()) +
-              "; give 8 or 16 bit, grey, BGR or BGRA.");
+  require_depth(is_integer_image(image), image, name, "8 or 16 bit");
+}
+
+void require_image_or_float(const cv::Mat& image, const std::string& name) {
+  require_depth(is_integer_image(image) || image.depth() == CV_32F, image, name,
+                "8 or 16 bit, or float in [0, 1]");
 }
 
 cv::Mat to_bgr8(const cv::Mat& image) {

@@ -10,7 +10,10 @@ namespace widestereo {
 /// message.
 void require_image(const cv::Mat& image, const std::string& name);
 
-/// Such an image as CV_8UC3; empty if it is empty.
+/// The same, but float will do, too.
+void require_image_or_float(const cv::Mat& image, const std::string& name);
+
+/// An image of 8 or 16 bit as CV_8UC3; empty if it is empty.
 cv::Mat to_bgr8(const cv::Mat& image);
 
 }  // namespace widestereo

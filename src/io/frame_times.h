@@ -8,10 +8,11 @@
 
 namespace widestereo {
 
+inline bool has_time(const SequenceFrame& frame) { return frame.nanoseconds.has_value(); }
+
 /// Whether all frames have one, without which they have an order alone.
 inline bool have_times(const std::vector<SequenceFrame>& frames) {
-  return std::all_of(frames.begin(), frames.end(),
-                     [](const SequenceFrame& frame) { return frame.nanoseconds.has_value(); });
+  return std::all_of(frames.begin(), frames.end(), has_time);
 }
 
 }  // namespace widestereo

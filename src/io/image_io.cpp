@@ -15,10 +15,12 @@
 #include <system_error>
 
 #include "geometry/validation.h"
+#include "io/bgr8.h"
 #include "io/exr.h"
 #include "io/intensity_range.h"
 #include "io/pfm.h"
 #include "statistics/percentile.h"
+#include "text/file_type.h"
 #include "text/lower_case.h"
 #include "text/number.h"
 #include "widestereo/error.h"
@@ -33,19 +35,20 @@ constexpr std::uintmax_t largest_file = 4ull << 30;
 constexpr double white_of_16_bits = 65535;
 
 std::vector<uchar> read_bytes(const fs::path& path) {
-  std::error_code error;
-  const auto status = fs::status(path, error);
-  if (status.type() == fs::file_type::none) {
-    throw Error("Cannot read " + path.string() + ": " + error.message() +
-                "; check the permissions of its folder.");
+  const fs::file_type type = type_of(path);
+  if (type == fs::file_type::not_found) {
+    throw Error("There is no file " + path.string() + "; check the path.");
   }
-  if (!fs::exists(status)) throw Error("There is no file " + path.string() + "; check the path.");
-  if (!fs::is_regular_file(status)) {
+  if (type != fs::file_type::regular) {
     throw Error(path.string() + " is not a file; give an image file.");
   }
+  std::error_code error;
   const std::uintmax_t size = fs::file_size(path, error);
-  if (error || size > largest_file) {
-    throw Error("Cannot read " + path.string() + ": it is larger than 4 GiB or not readable.");
+  if (error) {
+    throw Error("Cannot read " + path.string() + ": " + error.message() + "; check the disk.");
+  }
+  if (size > largest_file) {
+    throw Error(path.string() + " is larger than 4 GiB; give an image of less.");
   }
   std::vector<uchar> bytes(size);
   std::ifstream file(path, std::ios::binary);
@@ -134,10 +137,7 @@ cv::Mat decode(const std::vector<uchar>& bytes, const fs::path& path, const std:
 /// `path`: the file that has them, which messages name.
 cv::Mat image_in(const std::vector<uchar>& bytes, const fs::path& path) {
   cv::Mat image = decode(bytes, path, "an image", "PNG, JPEG, TIFF, PGM or BMP");
-  const bool depth_known = image.depth() == CV_8U || image.depth() == CV_16U;
-  if (!depth_known || (image.channels() != 1 && image.channels() != 3 && image.channels() != 4)) {
-    throw Error(path.string() + " is not an 8- or 16-bit grey or colour image; convert it first.");
-  }
+  require_image(image, path.string());
   return image;
 }
 
@@ -243,26 +243,13 @@ cv::Mat stretched(const cv::Mat& image, int white, const std::string& name) {
 }
 
 cv::Mat to_intensity(const cv::Mat& image, const std::string& name) {
-  if (image.empty()) throw Error(name + " is empty; give an image.");
-  double scale = 1;
-  if (image.depth() == CV_8U) {
-    scale = 1 / 255.0;
-  } else if (image.depth() == CV_16U) {
-    scale = 1 / white_of_16_bits;
-  } else if (image.depth() != CV_32F) {
-    throw Error(name + " has an unsupported type; use 8 or 16 bit, or float in [0, 1].");
-  }
-  cv::Mat grey;
-  if (image.channels() == 1) {
-    grey = image;
-  } else if (image.channels() == 3) {
-    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  } else if (image.channels() == 4) {
-    cv::cvtColor(image, grey, cv::COLOR_BGRA2GRAY);
-  } else {
-    throw Error(name + " has " + std::to_string(image.channels()) +
-                " channels; use a grey, BGR or BGRA image.");
-  }
+  require_image_or_float(image, name);
+  const double scale = image.depth() == CV_8U    ? 1 / 255.0
+                       : image.depth() == CV_16U ? 1 / white_of_16_bits
+                                                 : 1;
+  cv::Mat grey = image;
+  if (image.channels() == 3) cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  if (image.channels() == 4) cv::cvtColor(image, grey, cv::COLOR_BGRA2GRAY);
   cv::Mat intensity;
   grey.convertTo(intensity, CV_32F, scale);
   // Integers are in range.

@@ -14,6 +14,7 @@
 #include "io/bgr8.h"
 #include "statistics/percentile.h"
 #include "text/formatted.h"
+#include "text/number.h"
 #include "text/size_text.h"
 #include "widestereo/error.h"
 #include "widestereo/matcher.h"
@@ -108,6 +109,19 @@ cv::Mat with_bar(const cv::Mat& picture, int map,
   return result;
 }
 
+void require_ascending(double low, double high, const std::string& what) {
+  if (low < high && std::isfinite(high - low)) return;
+  throw Error("Colours from " + text_of(low) + " to " + text_of(high) + " show no " + what +
+              "; give a lower and a higher one.");
+}
+
+void require_range(const ColourRange& range) {
+  require_ascending(range.nearest, range.farthest, "distances");
+  if (range.nearest > 0) return;
+  throw Error("Colours from the distance " + text_of(range.nearest) +
+              " on have no inverse distance; give a positive one.");
+}
+
 }  // namespace
 
 ColourRange robust_range(const cv::Mat& distance) {
@@ -124,6 +138,7 @@ ColourRange robust_range(const cv::Mat& distance) {
 
 cv::Mat distance_picture(const cv::Mat& distance, const ColourRange& range) {
   require_type(distance, CV_32FC1, "The distance map");
+  require_range(range);
   const double low = 1 / range.farthest;
   const double high = 1 / range.nearest;
   cv::Mat valid(distance.size(), CV_8UC1);
@@ -154,6 +169,7 @@ cv::Mat normal_picture(const cv::Mat& normals) {
 
 cv::Mat scalar_picture(const cv::Mat& map, double low, double high) {
   require_type(map, CV_32FC1, "The map to show");
+  require_ascending(low, high, "values");
   return coloured((map - low) / (high - low), map == map, cv::COLORMAP_VIRIDIS);  // NaN: no value
 }
 
@@ -205,6 +221,7 @@ cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_fr
 
 cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range,
                              const std::string& unit) {
+  require_range(range);
   std::vector<std::pair<double, std::string>> labels;
   const double low = 1 / range.farthest;
   const double high = 1 / range.nearest;

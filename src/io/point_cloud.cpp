@@ -78,16 +78,6 @@ PointCloud make_point_cloud(const cv::Mat& distance, const cv::Mat& rays, const 
 
 void write_ply(const std::filesystem::path& path, const PointCloud& cloud,
                const Eigen::Vector3d& origin) {
-  std::vector<char> bytes;
-  bytes.reserve(cloud.size() * 31);
-  for (const CloudPoint& point : cloud) {
-    for (int i = 0; i < 3; ++i) append(bytes, point.position[i]);
-    for (int i = 0; i < 3; ++i) append(bytes, point.normal[i]);
-    append(bytes, point.red);
-    append(bytes, point.green);
-    append(bytes, point.blue);
-    append(bytes, point.confidence);
-  }
   write_file(path, [&](std::ostream& stream) {
     stream << "ply\nformat binary_little_endian 1.0\n"
            << "comment world frame and unit of the cameras' poses\n";
@@ -100,7 +90,17 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud,
            << "property float nx\nproperty float ny\nproperty float nz\n"
            << "property uchar red\nproperty uchar green\nproperty uchar blue\n"
            << "property float confidence\nend_header\n";
-    stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    std::vector<char> bytes;  // of one point: large clouds leave no room for another copy
+    for (const CloudPoint& point : cloud) {
+      bytes.clear();
+      for (int i = 0; i < 3; ++i) append(bytes, point.position[i]);
+      for (int i = 0; i < 3; ++i) append(bytes, point.normal[i]);
+      append(bytes, point.red);
+      append(bytes, point.green);
+      append(bytes, point.blue);
+      append(bytes, point.confidence);
+      stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    }
   });
 }
 

@@ -9,6 +9,7 @@
 
 #include "io/frame_images.h"
 #include "io/frame_times.h"
+#include "text/file_type.h"
 #include "text/lower_case.h"
 #include "text/number.h"
 #include "text/text_input.h"
@@ -65,7 +66,7 @@ CameraImages images_listed_in(const fs::path& list) {
         comma == std::string::npos ? comma : line.find_first_not_of(' ', comma + 1);
     if (!whole_number(time) || start == std::string::npos) {
       throw Error(list.string() + " line " + std::to_string(number) +
-                  " is no \"nanoseconds,filename\".");
+                  " is no \"nanoseconds,filename\"; correct it.");
     }
     const auto [earlier, is_new] = lines.emplace(time, number);
     if (!is_new) {
@@ -75,19 +76,8 @@ CameraImages images_listed_in(const fs::path& list) {
     }
     images.of_frames.emplace(time, list.parent_path() / "data" / line.substr(start));
   }
-  if (images.of_frames.empty()) throw Error(list.string() + " lists no images.");
+  if (images.of_frames.empty()) throw Error(list.string() + " lists no images; add them.");
   return images;
-}
-
-/// What lies at a path, of type not_found if nothing does.
-fs::file_type type_of(const fs::path& path) {
-  std::error_code error;
-  const fs::file_type type = fs::status(path, error).type();
-  if (type == fs::file_type::none) {
-    throw Error("Cannot read " + path.string() + ": " + error.message() +
-                "; check the permissions of its folder.");
-  }
-  return type;
 }
 
 bool is_folder(const fs::path& path) { return type_of(path) == fs::file_type::directory; }
@@ -168,7 +158,6 @@ void require_usable_names(const std::vector<SequenceFrame>& frames) {
 
 /// A file of one camera that is named unlike the frames, which have times, is none of them.
 void leave_out_strays(std::vector<SequenceFrame>& frames) {
-  const auto has_time = [](const SequenceFrame& frame) { return frame.nanoseconds.has_value(); };
   const bool are_timed = std::all_of(frames.begin(), frames.end(), [&](const SequenceFrame& frame) {
     return has_time(frame) || !is_complete(frame);
   });

@@ -197,7 +197,6 @@ Eigen::Isometry3d pose_at(const std::vector<StampedPose>& trajectory, double sec
 
 /// Which frame has no time though others have one, empty if none has.
 std::string without_time(const std::vector<SequenceFrame>& frames) {
-  const auto has_time = [](const SequenceFrame& frame) { return frame.nanoseconds.has_value(); };
   const auto first = std::find_if_not(frames.begin(), frames.end(), has_time);
   if (first == frames.end() || std::none_of(frames.begin(), frames.end(), has_time)) return "";
   return " (the first is " + first->name + ")";

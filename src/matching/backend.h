@@ -2,7 +2,6 @@
 // What a back end must provide: memory, images and launching; no algorithm.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <vector>

@@ -21,7 +21,8 @@ std::size_t bytes_of(PixelType pixel) {
 void require_one_for_each_view(std::size_t views, std::size_t images, std::size_t maps) {
   if (images == views && maps == views) return;
   throw Error("The rig has " + std::to_string(views) + " views, but " + std::to_string(images) +
-              " image(s) and maps for " + std::to_string(maps) + " view(s) were given.");
+              " image(s) and maps for " + std::to_string(maps) +
+              " view(s) were given; give one of each for every view.");
 }
 
 void require_rows(const DeviceRows& rows, const std::string& what) {

@@ -97,11 +97,7 @@ void add_work(std::vector<KernelTime>& times, const Schedule& schedule) {
       return t.kernel == to_string(dispatch.kernel);
     });
     if (time == times.end()) continue;
-    const KernelWork work = work_of(schedule, dispatch);
-    time->work.samples += work.samples;
-    time->work.operations += work.operations;
-    time->work.texels += work.texels;
-    time->work.bytes += work.bytes;
+    time->work += work_of(schedule, dispatch);
   }
 }
 
@@ -128,7 +124,8 @@ class Matcher::Implementation {
                    "match one without a warm start or give its planes.");
     if (!start.hypotheses.empty() && start.hypotheses.size() != rig_.views.size()) {
       throw Error("The rig has " + std::to_string(rig_.views.size()) + " views, but planes of " +
-                  std::to_string(start.hypotheses.size()) + " were given to start from.");
+                  std::to_string(start.hypotheses.size()) +
+                  " were given to start from; give a map for each view.");
     }
     for (std::size_t i = 0; i < start.hypotheses.size(); ++i) {
       const View& view = rig_.views[i];
@@ -149,7 +146,7 @@ class Matcher::Implementation {
     const auto start = std::chrono::steady_clock::now();
     if (images.size() != rig_.views.size()) {
       throw Error("The rig has " + std::to_string(rig_.views.size()) + " views, but " +
-                  std::to_string(images.size()) + " image(s) were given.");
+                  std::to_string(images.size()) + " image(s) were given; give one for each view.");
     }
     std::vector<cv::Mat> intensities;
     std::vector<double> gains;

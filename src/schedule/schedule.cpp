@@ -10,6 +10,7 @@
 
 #include "geometry/angle.h"
 #include "geometry/camera_parameters.h"
+#include "geometry/camera_scale.h"
 #include "geometry/validation.h"
 #include "kernel/enumerations.h"
 #include "text/size_text.h"
@@ -76,8 +77,7 @@ View halved(const View& view) {
   Camera& camera = half.camera;
   camera.width = (camera.width + 1) / 2;
   camera.height = (camera.height + 1) / 2;
-  for (double* scaled : {&camera.fx, &camera.fy, &camera.skew, &camera.shear}) *scaled *= 0.5;
-  for (double* centre : {&camera.cx, &camera.cy}) *centre = 0.5 * (*centre + 0.5) - 0.5;
+  scale_intrinsics(camera, 0.5, 0.5);
   half.mask = cv::Mat();  // masked pixels arrive with the intensities
   return half;
 }

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 
+#include "evaluation/ground_truth.h"
 #include "geometry/validation.h"
 
 namespace widestereo::synthesis {
@@ -66,14 +67,14 @@ class ViewRenderer {
         visibility(view_.world_from_camera * (hit->distance * ray));
   }
 
-  /// 255 visible in the other view, 0 hidden, 128 outside its image or field of view.
+  /// From the other view.
   uchar visibility(const Eigen::Vector3d& point) const {
     const Eigen::Vector3d in_other = other_.world_from_camera.inverse() * point;
     Eigen::Vector2d pixel;
-    if (!other_camera_.project_into_image(in_other, pixel)) return 128;
+    if (!other_camera_.project_into_image(in_other, pixel)) return outside_label;
     const double distance = in_other.norm();
     const auto hit = scene_.cast(world_ray(other_, in_other / distance));
-    return hit && hit->distance < distance * (1 - 1e-6) ? 0 : 255;
+    return hit && hit->distance < distance * (1 - 1e-6) ? hidden_label : visible_label;
   }
 
   void set_colour(int x, int y) {

@@ -48,13 +48,6 @@ ViewResult match(const RenderedPair& pair, const Options& options) {
   return match_on_cpu(pair, options, 0.4, 20);
 }
 
-/// Of the pixels that are not occluded, the share that is wrong by more than `pixels`.
-double wrong_by(int pixels, const ViewResult& view, const RenderedPair& pair) {
-  const auto scores =
-      evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
-  return scores[1].bad_pixels.at(pixels);
-}
-
 TEST(BlankWalls, AreFoundFromTheirEdgesAndNotCertain) {
   const RenderedPair pair = render_blank_room(256);
   for (const char* preset : {"fast", "quality"}) {

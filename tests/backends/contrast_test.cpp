@@ -71,14 +71,6 @@ cv::Mat seen_through(const cv::Mat& image, double gain, double offset) {
   return seen;
 }
 
-/// Share of the first view's non-occluded pixels.
-double wrong_by_a_pixel(const RenderedPair& pair, const ViewResult& view) {
-  const std::vector<RegionScores> scores =
-      evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]);
-  EXPECT_EQ(scores[1].region, "non-occluded");
-  return scores[1].bad_pixels.at(1.0);
-}
-
 /// Pixels that are white after that take part like all others.
 TEST(Contrast, OfHazyImagesIsStretchedAsThatOfDarkOnes) {
   const RenderedPair pair = render_demo(96);
@@ -89,7 +81,7 @@ TEST(Contrast, OfHazyImagesIsStretchedAsThatOfDarkOnes) {
     }
     const ViewResult view = match(pair.rig, images, 20).views[0];
     EXPECT_GT(view.gain, 3);
-    return wrong_by_a_pixel(pair, view);
+    return wrong_by(1, view, pair);
   };
   const double of_dark = wrong(5);
   EXPECT_LT(of_dark, 0.3);
@@ -103,7 +95,7 @@ TEST(Contrast, AnOffsetInOneCameraCostsLittle) {
     const std::vector<cv::Mat> images = images_of(pair);
     const StereoResult result =
         match(pair.rig, {seen_through(images[0], 1, 0), seen_through(images[1], gain, offset)}, 1);
-    const double share = wrong_by_a_pixel(pair, result.views[0]);
+    const double share = wrong_by(1, result.views[0], pair);
     RecordProperty(name, std::to_string(share));
     return share;
   };

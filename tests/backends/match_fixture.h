@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "non_occluded.h"
 #include "same_bits.h"
 #include "widestereo/matcher.h"
 #include "widestereo/synthesis.h"
@@ -26,6 +27,13 @@ inline ViewResult match_on_cpu(const RenderedPair& pair, Options options, double
   options.max_distance = farthest;
   Device device = Device::open("cpu");
   return Matcher(device, pair.rig, options).match(images_of(pair)).views[0];
+}
+
+/// Of camera 0's pixels that are not occluded, the share that is wrong by more than `pixels`.
+inline double wrong_by(int pixels, const ViewResult& view, const RenderedPair& pair) {
+  return non_occluded(
+             evaluate(view.distance, {}, pair.views[0].truth, pair.rig.views[0], pair.rig.views[1]))
+      .bad_pixels.at(pixels);
 }
 
 /// Camera 0 to world after steps of 5 cm and two degrees.

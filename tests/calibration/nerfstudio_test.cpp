@@ -31,11 +31,9 @@ class Nerfstudio : public ::testing::Test {
   SfmModel model(const std::string& text) {
     return SfmModel(folder_.write("transforms.json", text));
   }
-  View view(const std::string& text, std::size_t image = 0) {
-    return model(text).calibrated({image}).rig.views.front();
-  }
+  View view(const std::string& text, std::size_t image = 0) { return model(text).view(image); }
   std::string error(const std::string& text) {
-    return test::error_of([&] { model(text).calibrated({0}); });
+    return test::error_of([&] { model(text).view(0); });
   }
   test::TemporaryFolder folder_;
 };
@@ -132,10 +130,10 @@ TEST_F(Nerfstudio, FramesMayHaveTheirOwnCamerasAndMasks) {
   const SfmModel model = this->model(text);
   EXPECT_EQ(model.names(), (std::vector<std::string>{"a.png", "b.png"}));
   EXPECT_FALSE(model.has_points());
-  const View a = model.calibrated({0}).rig.views.front();
+  const View a = model.view(0);
   EXPECT_EQ(a.camera.fx, 30);
   EXPECT_TRUE(a.mask.empty());
-  const View b = model.calibrated({1}).rig.views.front();
+  const View b = model.view(1);
   EXPECT_EQ(b.camera.fx, 40);
   EXPECT_EQ(b.camera.k1, 0.01);
   EXPECT_EQ(b.mask.size(), cv::Size(96, 80));

@@ -297,6 +297,12 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
                             file("set/depth1.tiff") + " -c " + file("calib.yaml");
   EXPECT_NE(run(alone).output.find("is scored as of view 1, by the record beside it"),
             std::string::npos);
+  const std::string timed = file("distance1403636579763555584.tiff");  // as of EuRoC's frames
+  fs::copy_file(file("prediction.tiff"), timed);
+  EXPECT_NE(
+      run("evaluate " + timed + " --truth " + file("set/depth1.tiff") + " -c " + file("calib.yaml"))
+          .output.find("is scored as of view 1, by the record beside it"),
+      std::string::npos);
   // As OpenCV's samples write them, without a size.
   folder_.write("opencv.yml",
                 "K1: [30, 0, 47.5, 0, 30, 47.5, 0, 0, 1]\nD1: [0, 0, 0, 0]\n"

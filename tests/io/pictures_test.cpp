@@ -250,6 +250,10 @@ TEST(Pictures, RefuseWrongMaps) {
   expect([&] { robust_range(wide); }, "distance map is CV_64FC1 instead of CV_32FC1");
   expect([&] { robust_range({}); }, "distance map is empty");
   expect([&] { distance_picture(bytes, {1, 2}); }, "distance map is CV_8UC1");
+  expect([&] { distance_picture(one, {2, 2}); }, "Colours from 2 to 2 show no distances;");
+  expect([&] { distance_picture(one, {-1, 2}); }, "distance -1 on");
+  expect([&] { with_distance_legend(cv::Mat(64, 64, CV_8UC3), {0, NAN}); }, "from 0 to nan");
+  expect([&] { scalar_picture(one, 1, 0); }, "Colours from 1 to 0 show no values;");
   expect([&] { normal_picture(one); }, "normal map is CV_32FC1");
   expect([&] { scalar_picture(cv::Mat::ones(2, 4, CV_32FC2), 0, 1); }, "is CV_32FC2");
   expect([&] { reason_picture(bytes, bytes); }, "map of reasons is CV_8UC1");
