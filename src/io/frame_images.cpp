@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "io/frame_times.h"
 #include "widestereo/sequence.h"
 
 namespace widestereo {
@@ -104,8 +105,6 @@ std::vector<std::pair<std::int64_t, std::string>> times_of(const CameraImages& i
   std::sort(times.begin(), times.end());
   return times;
 }
-
-constexpr double seconds_per_nanosecond = 1e-9;
 
 double seconds_apart(std::int64_t a, std::int64_t b) {
   return std::abs(static_cast<double>(a - b)) * seconds_per_nanosecond;

@@ -8,6 +8,8 @@
 
 namespace widestereo {
 
+inline constexpr double seconds_per_nanosecond = 1e-9;
+
 inline bool has_time(const SequenceFrame& frame) { return frame.nanoseconds.has_value(); }
 
 /// Whether all frames have one, without which they have an order alone.

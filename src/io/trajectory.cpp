@@ -76,7 +76,7 @@ void require_order_of(const std::string& comment, bool w_first, const std::strin
 /// ORB-SLAM3's trajectories in EuRoC's form have nanoseconds between blanks.
 double seconds(double time) {
   constexpr double earliest_nanosecond = 1e17;  // of 1973
-  return time < earliest_nanosecond ? time : time * 1e-9;
+  return time < earliest_nanosecond ? time : time * seconds_per_nanosecond;
 }
 
 /// How all lines of a file hold poses, told by its first one.
@@ -125,7 +125,7 @@ class PoseLine {
       throw Error(where + " has the time " + word +
                   ", which is no whole number of nanoseconds; a pose is " + form_ + ".");
     }
-    return static_cast<double>(nanoseconds) * 1e-9;
+    return static_cast<double>(nanoseconds) * seconds_per_nanosecond;
   }
 
   bool comma_separated_;
@@ -159,7 +159,7 @@ double apart(const StampedPose& pose, double seconds) {
 }
 
 double seconds_of(const SequenceFrame& frame) {
-  return static_cast<double>(*frame.nanoseconds) * 1e-9;
+  return static_cast<double>(*frame.nanoseconds) * seconds_per_nanosecond;
 }
 
 /// The first pose at that time or later, of poses in the order of their times.
