@@ -9,7 +9,7 @@
 
 #include "calibration_commands.h"
 #include "calibration_fit.h"
-#include "matching_run.h"
+#include "image_checks.h"
 #include "option_checks.h"
 #include "pose_settings.h"
 #include "rig_settings.h"

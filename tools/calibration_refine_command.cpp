@@ -8,7 +8,7 @@
 
 #include "calibration_commands.h"
 #include "calibration_output.h"
-#include "matching_run.h"
+#include "image_checks.h"
 #include "option_checks.h"
 #include "rig_settings.h"
 #include "say.h"

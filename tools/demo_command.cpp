@@ -5,6 +5,7 @@
 #include <string>
 
 #include "commands.h"
+#include "folder_format.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "result_folder.h"

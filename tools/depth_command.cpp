@@ -7,8 +7,11 @@
 #include <system_error>
 #include <vector>
 
+#include "acceptance.h"
 #include "calibration_fit.h"
 #include "commands.h"
+#include "folder_format.h"
+#include "image_checks.h"
 #include "match_settings.h"
 #include "matching_run.h"
 #include "option_checks.h"

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "commands.h"
+#include "folder_format.h"
 #include "map_checks.h"
 #include "option_checks.h"
 #include "result_folder.h"

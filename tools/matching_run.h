@@ -10,7 +10,6 @@
 
 #include "folder_lock.h"
 #include "match_settings.h"
-#include "widestereo/epipolar.h"
 #include "widestereo/matcher.h"
 #include "widestereo/sfm_model.h"
 
@@ -35,25 +34,6 @@ widestereo::Device open_device(const MatchSettings& settings);
 
 /// Throws Error when validation was asked for and reported anything.
 void require_no_validation_messages(const widestereo::Device& device);
-
-/// Whether an image shows nothing but noise where the mask, which may be empty, is not 0.
-bool is_blank(const cv::Mat& image, const cv::Mat& mask);
-/// Which two views have one picture, as a sentence; empty where none have. That of one camera on
-/// both channels, or a copy, matches itself at any distance. Blank ones may be alike.
-std::string same_pictures(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
-/// Throws Error where there are such views.
-void require_different_pictures(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
-/// Says, on standard error, which images are blank: black ones, of a covered lens or a camera that
-/// failed.
-void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
-
-/// The features of a pair's images that match; none of more or fewer views.
-std::vector<widestereo::PixelMatch> features_of_pair(const std::vector<cv::Mat>& images);
-/// Says, on standard error, where many of a pair's features lie outside the range of distances,
-/// which the pixels there cannot tell: they match something else. `unit`: of lengths.
-void report_features_out_of_range(const widestereo::Rig& rig,
-                                  const std::vector<widestereo::PixelMatch>& matches,
-                                  const widestereo::Options& options, const std::string& unit);
 
 /// Says, on standard error, which views see nothing that another one does.
 void report_views_without_overlap(const widestereo::Rig& rig,

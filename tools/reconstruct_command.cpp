@@ -11,7 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "acceptance.h"
 #include "commands.h"
+#include "folder_format.h"
+#include "image_checks.h"
 #include "input_record.h"
 #include "match_settings.h"
 #include "matching_run.h"

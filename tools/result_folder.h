@@ -2,13 +2,13 @@
 // The folder of maps, pictures, clouds and the record that a match leaves.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
+#include "folder_format.h"
 #include "matching_run.h"
 #include "widestereo/evaluation.h"
 #include "widestereo/pictures.h"
@@ -19,50 +19,10 @@ inline constexpr const char* result_record = "result.json";
 /// Where a result is until it is complete, in the folder that it is for.
 inline constexpr const char* unfinished_result = ".unfinished";
 
-/// Which files are written.
-struct FolderFormat {
-  std::vector<std::string> maps = {"tiff"};  ///< of distance: tiff, exr, pfm, png
-  static constexpr double usual_png_scale = 1000;
-  double png_scale = usual_png_scale;  ///< units per metre of the 16-bit PNG
-  bool no_cloud = false;
-  bool no_pictures = false;
-  /// Adds --formats, --png-scale, --no-cloud and --no-pictures.
-  void add_to(CLI::App& command);
-  /// The same for many frames, with --clouds and --pictures: neither is written unless asked for.
-  void add_for_many_frames_to(CLI::App& command);
-  /// --clouds and --pictures alone: maps that are read again are TIFFs.
-  void add_for_fused_images_to(CLI::App& command);
-  /// Throws Error where a PNG cannot hold all distances of this range, or --png-scale is of none.
-  void require_room_for(double min_distance, double max_distance) const;
-
- private:
-  void add_maps_to(CLI::App& command);
-  void add_extras_to(CLI::App& command, const std::string& clouds);
-};
-
 /// Behind and above a camera, in proportion to the scene, looking down a little: what is wrong in a
 /// map leaves its surface there.
 Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
                                    const widestereo::ColourRange& range);
-
-/// How much of a view's lens was accepted, in [0, 1].
-double accepted_share(const widestereo::ViewResult& view);
-/// The mean of the views.
-double accepted_share(const std::vector<widestereo::ViewResult>& views);
-
-/// Adds the scale of a distance map that is read; `distances`: which, in the option's help.
-void add_png_scale_of_input(CLI::App& command, const std::string& option,
-                            const std::string& distances, double& scale);
-/// Throws Error where it was given for a map that has none.
-void require_scaled_png(const std::string& option, double scale, const std::filesystem::path& map);
-
-/// Says, on standard error, what to check where so little is accepted of all views that the images
-/// hardly fit their calibration.
-void report_little_accepted(double share, const std::string& first_cause);
-
-/// Says so, on standard error, where much of what was accepted lies at the nearest distance that
-/// was looked for.
-void report_nearest(const std::vector<widestereo::ViewResult>& views, double min_distance);
 
 struct FolderContents {
   const widestereo::Rig& rig;

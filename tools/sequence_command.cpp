@@ -11,9 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "acceptance.h"
 #include "calibration_fit.h"
 #include "commands.h"
+#include "folder_format.h"
 #include "frame_settings.h"
+#include "image_checks.h"
 #include "input_record.h"
 #include "match_settings.h"
 #include "matching_run.h"

@@ -4,10 +4,10 @@
 #include <string>
 
 #include "commands.h"
+#include "folder_format.h"
 #include "map_checks.h"
 #include "option_checks.h"
 #include "pose_settings.h"
-#include "result_folder.h"
 #include "rig_settings.h"
 #include "say.h"
 #include "size_settings.h"

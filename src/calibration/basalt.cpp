@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/camera_forms.h"
 #include "calibration/formats.h"
 #include "geometry/angle.h"
 #include "geometry/validation.h"

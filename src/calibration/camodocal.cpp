@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/camera_forms.h"
 #include "calibration/ocam.h"
 #include "calibration/yaml_camera.h"
 

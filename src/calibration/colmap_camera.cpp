@@ -3,7 +3,8 @@
 
 #include <optional>
 
-#include "calibration/formats.h"
+#include "calibration/camera_forms.h"
+#include "calibration/document.h"
 #include "text/number.h"
 #include "widestereo/error.h"
 

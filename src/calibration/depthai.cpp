@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "calibration/camera_forms.h"
 #include "calibration/yaml_camera.h"
 #include "text/number.h"
 

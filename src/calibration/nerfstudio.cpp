@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "calibration/formats.h"
+#include "calibration/document.h"
 #include "text/text_input.h"
 
 namespace widestereo::calibration {

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "calibration/camera_forms.h"
 #include "calibration/yaml_camera.h"
 
 namespace widestereo::calibration {

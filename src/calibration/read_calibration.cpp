@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
-#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -24,81 +21,6 @@
 
 namespace widestereo {
 namespace calibration {
-
-void Document::fail(const std::string& finding, const std::string& remedy) const {
-  throw Error(path.string() + ": " + finding + "; " + remedy + ".");
-}
-
-void set_unified_from_alpha(Camera& camera, double alpha) {
-  camera.model = CameraModel::unified;
-  camera.xi = alpha / (1 - alpha);
-  camera.fx *= 1 + camera.xi;
-  camera.fy *= 1 + camera.xi;
-}
-
-double unified_alpha(const Camera& camera) { return camera.xi / (1 + camera.xi); }
-
-Camera simplified(Camera camera) {
-  const auto lacks = [&camera](auto... members) { return ((camera.*members == 0) && ...); };
-  using C = Camera;
-  switch (camera.model) {
-    case CameraModel::pinhole_rational:
-      if (lacks(&C::k4, &C::k5, &C::k6, &C::s1, &C::s2, &C::s3, &C::s4)) {
-        camera.model = CameraModel::pinhole_radtan;
-      }
-      break;
-    case CameraModel::thin_prism_fisheye:
-    case CameraModel::rad_tan_thin_prism_fisheye:
-      if (lacks(&C::k5, &C::k6, &C::p1, &C::p2, &C::s1, &C::s2, &C::s3, &C::s4)) {
-        camera.model = CameraModel::kannala_brandt;
-      }
-      break;
-    default:
-      break;
-  }
-  return camera;
-}
-
-std::optional<int> whole_number(double value) {
-  if (!(value >= 1 && value <= 1e6) || value != std::floor(value)) return std::nullopt;
-  return static_cast<int>(value);
-}
-
-bool Document::contains(const char* words) const {
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string::npos) return false;
-  const bool has_comments = text[first] != '{' && text[first] != '<';  // YAML, OCamCalib
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
-    for (std::size_t at = has_comments ? line.find('#') : std::string::npos;
-         at != std::string::npos; at = line.find('#', at + 1)) {
-      if (at > 0 && line[at - 1] != ' ' && line[at - 1] != '\t') continue;
-      line.resize(at);
-      break;
-    }
-    if (line.find(words) != std::string::npos) return true;
-  }
-  return false;
-}
-
-void require_last_row(const Document& document, const std::string& what,
-                      const Eigen::RowVector4d& row) {
-  const Eigen::RowVector4d expected(0, 0, 0, 1);
-  if (((row - expected).array().abs() <= 1e-6).all()) return;
-  document.fail(what + " must end with the row 0 0 0 1",
-                "it may be transposed, as MATLAB and OpenGL have it");
-}
-
-Eigen::Isometry3d rigid(const Document& document, const std::string& what,
-                        const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
-  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
-  motion.linear() = rotation;
-  motion.translation() = translation;
-  require_rigid(motion, document.path.string() + ": " + what);
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  motion.linear() = svd.matrixU() * svd.matrixV().transpose();
-  return motion;
-}
 
 void add_view_of_body(Rig& rig, View view, const Eigen::Isometry3d& body_from_camera) {
   if (rig.views.empty()) {

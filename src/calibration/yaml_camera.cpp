@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "calibration/camera_forms.h"
 #include "geometry/angle.h"
 #include "text/number.h"
 
