@@ -87,6 +87,21 @@ void require_other_folder(const std::filesystem::path& output, const std::filesy
                   "results.");
 }
 
+void require_not_among(const std::filesystem::path& output,
+                       const std::vector<std::filesystem::path>& images) {
+  std::set<std::filesystem::path> folders;
+  for (const std::filesystem::path& image : images) folders.insert(image.parent_path());
+  for (const std::filesystem::path& folder : folders) require_other_folder(output, folder);
+}
+
+void require_different_cameras(std::vector<int> cameras) {
+  std::sort(cameras.begin(), cameras.end());
+  const auto twice = std::adjacent_find(cameras.begin(), cameras.end());
+  if (twice == cameras.end()) return;
+  throw ws::Error("--views names camera " + std::to_string(*twice) +
+                  " twice, which has one image of each frame; name it once.");
+}
+
 void require_different_images(const std::vector<std::filesystem::path>& images) {
   std::set<std::pair<dev_t, ino_t>> files;  // links have one in common
   for (const std::filesystem::path& image : images) {

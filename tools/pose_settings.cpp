@@ -79,9 +79,10 @@ Eigen::Vector3d move_near_origin(std::vector<ws::View>& views) {
   const Eigen::Vector3d origin = ws::local_origin(views.front());
   if (origin.isZero()) return origin;
   for (ws::View& view : views) view.world_from_camera.translation() -= origin;
-  say(ws::formatted(
-      "Poses and clouds are relative to (%.0f, %.0f, %.0f), as the model lies far from its origin.",
-      origin.x(), origin.y(), origin.z()));
+  say(
+      ws::formatted("Poses and clouds are relative to (%.0f, %.0f, %.0f), as the model or "
+                    "trajectory lies far from its origin.",
+                    origin.x(), origin.y(), origin.z()));
   return origin;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "matching_run.h"
+#include "option_checks.h"
 #include "progress_bar.h"
 #include "say.h"
 #include "widestereo/calibration.h"
@@ -159,6 +160,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
                        : frames.folders.size());
     std::iota(cameras.begin(), cameras.end(), 0);
   }
+  require_different_cameras(cameras);
   const ChosenFrames chosen = frames.choose(images, cameras);
   const ws::Rig of_frame = rig.rig_for_images(cameras.size(), of_image);
   RigPoses known{.poses = {Eigen::Isometry3d::Identity()}, .of = {}, .frames = chosen.chosen};
@@ -169,18 +171,17 @@ PosedImages PosedImageSettings::of_trajectory() const {
   const std::vector<Eigen::Isometry3d>& world_from_rig = known.poses;
   PosedImages posed;
   posed.are_of_one_frame = known.frames.size() == 1;
-  posed.origin = world_from_rig.front().translation();
   for (std::size_t k = 0; k < known.frames.size(); ++k) {
     const ws::SequenceFrame& frame = chosen.all[known.frames[k]];
     for (std::size_t i = 0; i < of_frame.views.size(); ++i) {
       ws::View view = of_frame.views[i];
       view.name = frame.name + "/" + view.name;
       view.world_from_camera = world_from_rig[k] * view.world_from_camera;
-      view.world_from_camera.translation() -= posed.origin;
       posed.calibrated.push_back(std::move(view));
       posed.files.push_back(frame.images[i]);
     }
   }
+  posed.origin = move_near_origin(posed.calibrated);
   posed.distances = [](const Images&) { return std::nullopt; };
   return posed;
 }
@@ -225,18 +226,16 @@ void PosedImageSettings::leave_out_dark_rims(PosedImages& posed,
     for (std::size_t i = first; i < posed.views.size(); ++i) {
       if (!masked[i] && posed.views[i].camera == camera) of_camera.push_back(i);
     }
-    ws::Rig sample;
     std::vector<cv::Mat> seen;
     const std::size_t count = std::min(rim_images, of_camera.size());
     for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t image = of_camera[i * of_camera.size() / count];
-      sample.views.push_back(posed.views[image]);
-      seen.push_back(posed.read(image));
+      seen.push_back(posed.read(of_camera[i * of_camera.size() / count]));
     }
-    rig.leave_out_dark_rims(sample, seen);
+    std::vector<ws::View*> views;
     for (const std::size_t i : of_camera) {
       done[i] = true;
-      posed.views[i].camera.max_theta = sample.views.front().camera.max_theta;
+      views.push_back(&posed.views[i]);
     }
+    RigSettings::leave_out_dark_rim(views, seen);
   }
 }

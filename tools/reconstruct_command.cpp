@@ -157,6 +157,7 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
   if (!a.settings.max_distance) options.erase("max_distance");
   return {{"program", "widestereo " WIDESTEREO_VERSION},
           {"images", absolute_path(a.images.images)},
+          {"folders", a.images.frames.folders},
           {"calibration", absolute_path(a.images.rig.calibration)},
           {"mask", absolute_paths(a.images.rig.masks)},
           {"masks", absolute_path(a.images.masks)},
@@ -170,12 +171,18 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
           {"options", options}};
 }
 
+PosedImages images_of(const ReconstructArguments& arguments) {
+  PosedImages images = arguments.images.read(arguments.settings);
+  require_not_among(arguments.output, images.files);
+  return images;
+}
+
 /// Matches images group by group and joins their points.
 class Reconstruction {
  public:
   explicit Reconstruction(const ReconstructArguments& arguments)
       : arguments_(arguments),
-        images_(arguments.images.read(arguments.settings)),
+        images_(images_of(arguments)),
         groups_(within_range(groups_of(images_, arguments), images_, arguments.settings)),
         options_(options_of(groups_, images_, arguments)),
         device_(open_device(arguments.settings)),
@@ -245,6 +252,7 @@ class Reconstruction {
     }
     Json kept = Json::array();
     std::size_t not_given = 0;
+    std::size_t changed = 0;
     for (const Json& result : folders_.results()) {
       const auto image = wanted.find(result["name"].get<std::string>());
       if (image == wanted.end()) {
@@ -258,7 +266,10 @@ class Reconstruction {
                                             of_inputs.update(inputs);
                                             return of_inputs == result;
                                           });
-      if (!is_of_same || !folders_.is_there(result)) continue;
+      if (!is_of_same || !folders_.is_there(result)) {
+        ++changed;
+        continue;
+      }
       kept.push_back(result);
       matched_[number] = true;
     }
@@ -266,6 +277,11 @@ class Reconstruction {
     if (not_given > 0) {
       say("Images that are not given now: " + std::to_string(not_given) +
           ". Their results will be removed.");
+    }
+    if (changed > 0) {
+      say("Images that an earlier run matched: " + std::to_string(changed) +
+          " are matched again, as they are grouped with others now, or they, their poses or their "
+          "files have changed.");
     }
     if (kept.empty()) return;
     say("Kept as an earlier run matched them: " + std::to_string(kept.size()) + " of " +

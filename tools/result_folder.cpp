@@ -29,18 +29,30 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// Files of an earlier run, the record first; none where the folder holds no result.
-std::vector<std::string> earlier_files(const fs::path& folder) {
-  const Json record = record_in(folder);
+/// Discarded where there is no such file.
+Json json_in(const fs::path& file) {
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return Json();
+  return Json::parse(std::ifstream(file), nullptr, false);
+}
+
+/// What a record names, where it is one of this program.
+void append_files(const Json& record, std::vector<std::string>& files) {
   if (!record.is_object() || !record.value("program", Json()).is_string() ||
       !record["program"].get<std::string>().starts_with("widestereo ")) {
-    return {};
+    return;
   }
-  std::vector<std::string> files = {result_record};
   for (const std::string& file : files_of(record)) {
     // Someone may have edited it.
     if (!fs::path(file).has_parent_path()) files.push_back(file);
   }
+}
+
+/// Files of an earlier run but its record, and of one that ended while it replaced that.
+std::vector<std::string> earlier_files(const fs::path& folder) {
+  std::vector<std::string> files;
+  append_files(record_in(folder), files);
+  append_files(json_in(folder / interrupted_record), files);
   return files;
 }
 
@@ -53,7 +65,8 @@ std::vector<std::string> all_files_of(const Json& record) {
 
 /// Throws Error where something that is no file of an earlier run has a name of the new ones.
 void require_no_other_files(const fs::path& folder, const Json& record) {
-  const std::vector<std::string> earlier = earlier_files(folder);
+  std::vector<std::string> earlier = earlier_files(folder);
+  if (!earlier.empty()) earlier.emplace_back(result_record);
   for (const std::string& file : all_files_of(record)) {
     if (std::find(earlier.begin(), earlier.end(), file) != earlier.end()) continue;
     if (!fs::exists(fs::symlink_status(folder / file))) continue;
@@ -63,10 +76,21 @@ void require_no_other_files(const fs::path& folder, const Json& record) {
   }
 }
 
+/// For another run to know them as ours where this one ends before the new record is there.
+void note_files(const fs::path& folder, const Json& record) {
+  std::vector<std::string> files = earlier_files(folder);
+  append_files(record, files);
+  const Json views = {{{"files", files}}};
+  ws::write_text(folder / interrupted_record,
+                 ws::to_text({{"program", record["program"]}, {"views", views}}) + "\n");
+}
+
 /// Removes what the record of an earlier run names, nothing else. The record goes first: without it
 /// the folder is not complete.
 void remove_earlier_result(const fs::path& folder) {
-  for (const std::string& file : earlier_files(folder)) {
+  std::vector<std::string> files = earlier_files(folder);
+  if (!files.empty()) files.insert(files.begin(), result_record);
+  for (const std::string& file : files) {
     std::error_code error;
     fs::remove(folder / file, error);
     if (error) {
@@ -257,8 +281,8 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
       {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},
       {"origin",
-       "where a model lies far from its own origin, or reconstruct joins frames: to be added to "
-       "world coordinates for those of the model or trajectory; else 0"},
+       "where a model or trajectory lies far from its own origin: to be added to world coordinates "
+       "for those of the model or trajectory; else 0"},
       {"pixels", "integer coordinates are pixel centres"}};
   return record;
 }
@@ -272,11 +296,7 @@ Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
          Eigen::AngleAxisd(-0.35, Eigen::Vector3d::UnitX());
 }
 
-Json record_in(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_regular_file(folder / result_record, error)) return Json();
-  return Json::parse(std::ifstream(folder / result_record), nullptr, false);
-}
+Json record_in(const fs::path& folder) { return json_in(folder / result_record); }
 
 std::vector<std::string> files_of(const Json& record) {
   std::vector<std::string> files;
@@ -301,8 +321,11 @@ Json write_result_folder(const fs::path& folder, const FolderContents& contents,
   if (!contents.scores.empty()) record["scores"] = Json::parse(ws::to_json(contents.scores));
   ws::write_text(unfinished.path() / result_record, ws::to_text(record) + "\n");
   require_no_other_files(folder, record);
+  note_files(folder, record);
   remove_earlier_result(folder);
   move_result(unfinished.path(), folder, record);
+  std::error_code ignored;
+  fs::remove(folder / interrupted_record, ignored);
   return record;
 }
 

@@ -16,6 +16,8 @@
 
 /// The record of a result folder, which is written last.
 inline constexpr const char* result_record = "result.json";
+/// Names the files that may be there while a result takes its place, of it and of an earlier one.
+inline constexpr const char* interrupted_record = ".interrupted.json";
 /// Where a result is until it is complete, in the folder that it is for.
 inline constexpr const char* unfinished_result = ".unfinished";
 

@@ -156,8 +156,12 @@ bool ResultFolders::is_there(const Json& result) const {
   const Json record = record_in(path);
   const std::vector<std::string> files = files_of(record);
   return is_of_this_kind(record) && !files.empty() &&
-         std::all_of(files.begin(), files.end(),
-                     [&path](const auto& file) { return fs::exists(path / file); });
+         std::all_of(files.begin(), files.end(), [&path](const auto& file) {
+           std::error_code missing;
+           const std::uintmax_t bytes = fs::file_size(path / file, missing);
+           // A power failure may leave empty files.
+           return !missing && bytes > 0;
+         });
 }
 
 void ResultFolders::require_usable(const std::string& name) const {

@@ -148,31 +148,45 @@ bool RigSettings::looks_for_rim_of(const ws::Camera& camera) const {
 
 void RigSettings::leave_out_dark_rims(ws::Rig& rig, const std::vector<cv::Mat>& images) const {
   const std::vector<ws::View> calibrated = rig.views;
-  std::vector<bool> limited(calibrated.size());
+  std::vector<bool> done(calibrated.size());
   for (std::size_t i = 0; i < calibrated.size(); ++i) {
     const ws::Camera& camera = calibrated[i].camera;
-    if (limited[i] || !looks_for_rim_of(camera)) continue;
+    if (done[i] || !looks_for_rim_of(camera)) continue;
     // One camera may have taken several views, or cameras of one kind share their calibration.
-    std::vector<std::size_t> of_camera;
+    std::vector<ws::View*> of_camera;
     std::vector<cv::Mat> seen;
     for (std::size_t j = i; j < calibrated.size(); ++j) {
       if (!(calibrated[j].camera == camera)) continue;
-      of_camera.push_back(j);
-      if (images[j].size() == cv::Size(camera.width, camera.height)) seen.push_back(images[j]);
+      done[j] = true;
+      of_camera.push_back(&rig.views[j]);
+      seen.push_back(images[j]);
     }
-    const auto rim = ws::find_lens_rim(camera, seen);
-    bool is_told = false;
-    for (const std::size_t j : of_camera) {
-      limited[j] = true;
-      if (!rim || mask_leaves_out(rig.views[j], rim->dark)) continue;
-      rig.views[j].camera.max_theta = rim->usable;
-      is_told = true;
-    }
-    if (!is_told) continue;
-    say(rig.views[i].name +
-        (of_camera.size() > 1 ? ", like all images that are calibrated alike," : "") +
-        ws::formatted(" is black from %.1f degrees off the axis on and matched up to %.1f "
-                      "(--max-theta 180 matches all).",
-                      rim->dark * ws::degrees_per_radian, rim->usable * ws::degrees_per_radian));
+    leave_out_dark_rim(of_camera, seen);
   }
+}
+
+void RigSettings::leave_out_dark_rim(const std::vector<ws::View*>& views,
+                                     const std::vector<cv::Mat>& images) {
+  const ws::Camera camera = views.front()->camera;
+  std::vector<cv::Mat> of_its_size;
+  for (const cv::Mat& image : images) {
+    if (image.size() == cv::Size(camera.width, camera.height)) of_its_size.push_back(image);
+  }
+  const auto rim = ws::find_lens_rim(camera, of_its_size);
+  if (!rim) return;
+  std::vector<const ws::View*> limited;
+  for (ws::View* view : views) {
+    if (mask_leaves_out(*view, rim->dark)) continue;
+    view->camera.max_theta = rim->usable;
+    limited.push_back(view);
+  }
+  if (limited.empty()) return;
+  const std::string others = limited.size() == views.size()
+                                 ? "all images"
+                                 : std::to_string(limited.size() - 1) + " other image(s)";
+  say(limited.front()->name +
+      (limited.size() > 1 ? ", like " + others + " that are calibrated alike," : "") +
+      ws::formatted(" is black from %.1f degrees off the axis on and matched up to %.1f "
+                    "(--max-theta 180 matches all).",
+                    rim->dark * ws::degrees_per_radian, rim->usable * ws::degrees_per_radian));
 }

@@ -50,6 +50,9 @@ struct RigSettings {
   /// Limits such cameras to what their images show, unless masks do, and says so; one image for
   /// each view.
   void leave_out_dark_rims(widestereo::Rig& rig, const std::vector<cv::Mat>& images) const;
+  /// The same for views that are calibrated alike, by images of some of them.
+  static void leave_out_dark_rim(const std::vector<widestereo::View*>& views,
+                                 const std::vector<cv::Mat>& images);
 
   /// Applies --mask and --max-theta.
   void limit_fields_of_view(widestereo::Rig& rig) const;

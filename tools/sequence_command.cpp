@@ -118,9 +118,13 @@ Selection select_frames(const SequenceArguments& a) {
         "A sequence is of two cameras or more; give one that moves to `reconstruct`, with "
         "--poses.");
   }
+  require_different_cameras(cameras);
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
   for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
+  for (const ws::SequenceFrame& frame : selection.frames) {
+    require_not_among(a.output, frame.images);
+  }
   const auto& [start, images] = first_with_content(selection.frames, a.white_level);
   selection.calibrated = a.rig.rig_for_images(cameras.size(), images.front().size());
   selection.rig = selection.calibrated;
@@ -209,7 +213,13 @@ class SequenceRun {
   void run() {
     std::vector<Json> wanted;
     for (std::size_t i = 0; i < selection_.frames.size(); ++i) wanted.push_back(input_of(i));
+    const std::size_t earlier = std::min(folder_.frames().size(), wanted.size());
     const std::size_t finished = folder_.finished(wanted);
+    if (finished < earlier) {
+      say("Frames that an earlier run finished: " + std::to_string(earlier - finished) +
+          " are matched again, from " + selection_.frames[finished].name +
+          " on, whose images, pose or files have changed since.");
+    }
     remaining_ = selection_.frames.size() - finished;
     if (remaining_ == 0) return;
     report_few_sources(options_, selection_.rig.views.size());

@@ -44,8 +44,6 @@ const ColmapModel* find_model(const std::string& name) {
   return find_colmap_model(name == aria_name ? "RAD_TAN_THIN_PRISM_FISHEYE" : name);
 }
 
-Json parsed(const fs::path& file) { return Json::parse(TextInput(file).rest(), nullptr, false); }
-
 bool has_frames(const Json& root) {
   return root.is_object() && root.contains("frames") && root["frames"].is_array();
 }
@@ -107,7 +105,13 @@ void remove_nulls(Json& object) {
 
 class Reader {
  public:
-  explicit Reader(const fs::path& file) : document_{file, {}}, root_(parsed(file)) {
+  explicit Reader(const fs::path& file) : document_{file, {}} {
+    try {
+      root_ = Json::parse(TextInput(file).rest());
+    } catch (const Json::parse_error& error) {
+      document_.fail(std::string("It is not valid JSON (") + error.what() + ")",
+                     "correct it there, or copy it again");
+    }
     if (!has_frames(root_))
       document_.fail("It has no list \"frames\"", "it may be damaged: copy it again");
     if (root_["frames"].empty()) document_.fail("Its list \"frames\" is empty", "add the images");

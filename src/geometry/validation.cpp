@@ -44,10 +44,18 @@ bool is_rotation(const Eigen::Matrix3d& matrix) {
 }  // namespace
 
 void require_rigid(const Eigen::Isometry3d& pose, const std::string& name) {
-  if (pose.matrix().allFinite() && is_rotation(pose.linear())) return;
-  throw Error(name +
-              ": the pose is not a rigid motion; its rotation must be orthonormal with "
-              "determinant +1 and all entries finite.");
+  const bool finite = pose.matrix().allFinite();
+  const Eigen::Matrix3d& rotation = pose.linear();
+  if (finite && is_rotation(rotation)) return;
+  std::string remedy =
+      "its rotation must be orthonormal with determinant +1 and all entries finite";
+  const double scale = finite ? std::cbrt(rotation.determinant()) : 0;
+  if (scale > 0 && is_rotation(rotation / scale)) {
+    remedy = "its rotation is " + formatted("%g", scale) + " times one; divide these nine by that";
+  } else if (scale < 0 && is_rotation(rotation / scale)) {
+    remedy = "it mirrors, as between frames of left and right hands; negate an axis";
+  }
+  throw Error(name + ": the pose is not a rigid motion; " + remedy + ".");
 }
 
 void validate(const Camera& c, const std::string& name) {

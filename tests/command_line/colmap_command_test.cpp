@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Images whose calibration is a COLMAP model or a transforms.json.
 #include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "command_fixture.h"
 #include "same_bits.h"
@@ -282,12 +283,16 @@ TEST_F(ReconstructCommand, KeepsAnImageOfTwoGroupsWhicheverMatchedIt) {
 
 TEST_F(ReconstructCommand, DamagedMapsOfAnEarlierRunAreNamedWithTheRemedy) {
   ASSERT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
-  folder_.write("out/right/1.png/normals0.tiff", "");
+  folder_.write("out/right/1.png/normals0.tiff", "damaged");
   const Outcome damaged = run(reconstruct() + "--min-views 1");  // says also what is kept
   EXPECT_NE(damaged.exit_code, 0);
   EXPECT_NE(damaged.output.find("out/right/1.png/normals0.tiff; remove "), std::string::npos);
   std::filesystem::remove_all(folder_ / "out/right/1.png");
   EXPECT_EQ(run(reconstruct() + "--min-views 1").exit_code, 0);
+  folder_.write("out/right/1.png/normals0.tiff", "");  // as a power failure leaves it
+  const Outcome empty = run(reconstruct() + "--min-views 1");
+  EXPECT_EQ(empty.exit_code, 0) << empty.output;
+  EXPECT_NE(empty.output.find("1 are matched again"), std::string::npos) << empty.output;
 }
 
 TEST_F(ReconstructCommand, LittleThatIsAcceptedGivesAHint) {
@@ -587,6 +592,29 @@ TEST_F(TransformsCommand, TakesATransformsFile) {
   EXPECT_EQ(record_of("out/left.png")["conventions"]["unit"], "that of the reconstruction");
   expect_error("calibration show " + file("images/transforms.json"),
                "is a COLMAP model or transforms.json");
+}
+
+TEST_F(TransformsCommand, AMaskOfOneImageLeavesTheRimsOfOthers) {
+  write_transforms("images/transforms.json", "left.png", "right/1.png");
+  std::string frames = bytes_of("images/transforms.json");
+  const std::string first = R"("file_path": "left.png", )";
+  frames.insert(frames.find(first) + first.size(), R"("mask_path": "mask.png", )");
+  folder_.write("images/transforms.json", frames);
+  cv::Mat inside(96, 96, CV_8UC1, cv::Scalar(0));
+  cv::circle(inside, {48, 48}, 36, cv::Scalar(255), cv::FILLED);
+  cv::imwrite(file("images/mask.png"), inside);
+  for (const char* name : {"images/left.png", "images/right/1.png"}) {
+    cv::Mat image = cv::imread(file(name), cv::IMREAD_UNCHANGED);
+    cv::Mat outside(image.size(), CV_8UC1, cv::Scalar(255));
+    cv::circle(outside, {48, 48}, 40, cv::Scalar(0), cv::FILLED);
+    image.setTo(0, outside);
+    cv::imwrite(file(name), image);
+  }
+  const Outcome outcome = run(reconstruct_with("images/transforms.json") + range);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("right/1.png is black from"), std::string::npos) << outcome.output;
+  EXPECT_LT(record_of("out/right/1.png")["views"][0]["max_theta_degrees"], 120);
+  EXPECT_EQ(record_of("out/left.png")["views"][0]["max_theta_degrees"], 180);
 }
 
 TEST_F(TransformsCommand, OneThatIsCutOffIsNamed) {

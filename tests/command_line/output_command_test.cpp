@@ -205,6 +205,19 @@ TEST_F(Output, FilesOfOthersAreNotReplaced) {
   EXPECT_TRUE(files_in("out").empty());
 }
 
+TEST_F(Output, OfARunThatWasKilledAsItMovedTheFilesIsReplaced) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 0);
+  const std::set<std::string> files = files_in("out");
+  // Of the new result some files are there, and no record.
+  fs::rename(folder_ / "out/result.json", folder_ / "out/.interrupted.json");
+  fs::remove(folder_ / "out/distance0.tiff");
+  fs::create_directories(folder_ / "out/.unfinished");
+  folder_.write("out/.unfinished/result.json", "{}");
+  const Outcome outcome = run(depth_of("left.png", "right.png"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(files_in("out"), files);
+}
+
 #ifndef __SANITIZE_ADDRESS__  // which needs more memory than this to begin with
 TEST_F(Output, LackOfMemoryIsNamed) {
   cv::imwrite(file("big.png"), cv::Mat(12000, 12000, CV_8UC1, cv::Scalar(0)));

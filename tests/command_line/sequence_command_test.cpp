@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <Eigen/Geometry>
+#include <chrono>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -730,8 +731,7 @@ TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
   };
   EXPECT_EQ(record()["images"].size(), 4U);
   EXPECT_GT(record()["cloud"]["points"].get<int>(), 100);
-  // The pose of the first frame, in the file.
-  EXPECT_EQ(record()["cloud"]["origin"], (nlohmann::json{0, 0, 0.1}));
+  EXPECT_EQ(record()["cloud"]["origin"], (nlohmann::json{0, 0, 0}));
   for (const char* name : {"000/cam0", "000/cam1", "001/cam0", "001/cam1"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / name / "distance0.tiff")) << name;
   }
@@ -745,6 +745,37 @@ TEST_F(SequencePoses, MakeOneSceneOfAllFrames) {
   fs::rename(folder_ / "data/cam0", folder_ / "data/left");
   EXPECT_EQ(run(reconstruct + poses + " --folders left,cam1 --overwrite").exit_code, 0);
   EXPECT_EQ(record()["images"].size(), 6U);
+  expect_error(reconstruct + poses + " --folders cam1,left", "folders");
+  expect_error(reconstruct + poses + " --views 0,0 --folders left,cam1", "camera 0 twice");
+}
+
+TEST_F(SequencePoses, ResultsDoNotGoAmongTheImages) {
+  const std::string within = " -c " + file("calib.yaml") + quick + "-o " + file("data/cam1");
+  expect_error("reconstruct " + file("data") + within + " --poses " + file("camera.txt"),
+               "is the folder of the images");
+  expect_error("sequence " + file("data") + within, "is the folder of the images");
+}
+
+/// Where poses begin decides no result.
+TEST_F(SequencePoses, ResultsOfLaterFramesAreKeptWithoutTheFirst) {
+  const std::string reconstruct = "reconstruct " + file("data") + " -c " + file("calib.yaml") +
+                                  " -o " + file("out") + quick + "--min-views 1 --sources 1 " +
+                                  "--poses " + file("camera.txt");
+  ASSERT_EQ(run(reconstruct + " --first 1").exit_code, 0);
+  const Outcome all = run(reconstruct);
+  ASSERT_EQ(all.exit_code, 0) << all.output;
+  EXPECT_NE(all.output.find("Kept as an earlier run matched them"), std::string::npos)
+      << all.output;
+}
+
+TEST_F(SequenceCommand, SaysWhichFramesAreMatchedAgain) {
+  ASSERT_EQ(run(sequence()).exit_code, 0);
+  const fs::path changed = folder_ / "data/cam0/001.png";
+  fs::last_write_time(changed, fs::last_write_time(changed) + std::chrono::seconds(5));
+  const Outcome outcome = run(sequence());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("2 are matched again, from 001 on"), std::string::npos)
+      << outcome.output;
 }
 
 TEST_F(SequenceCommand, OneFrameOfARigIsAScene) {

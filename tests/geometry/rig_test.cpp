@@ -55,7 +55,11 @@ TEST(RigValidation, NamesWhatIsWrong) {
   rig.world_from_imu = rig.views[1].world_from_camera;
   EXPECT_EQ(message_of(rig), "");
   rig.world_from_imu->linear() *= 1.01;
-  EXPECT_NE(message_of(rig).find("IMU: the pose is not a rigid motion"), std::string::npos);
+  EXPECT_NE(message_of(rig).find("IMU: the pose is not a rigid motion; its rotation is 1.01 times "
+                                 "one; divide these nine by that."),
+            std::string::npos);
+  rig.world_from_imu->linear() = -rig.views[1].world_from_camera.linear();
+  EXPECT_NE(message_of(rig).find("it mirrors"), std::string::npos);
 
   rig = two_views();
   rig.views[0].mask = cv::Mat(48, 63, CV_8UC1, cv::Scalar(1));
