@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "benchmark_measurement.h"
 #include "benchmark_plot.h"
@@ -109,18 +110,27 @@ void replace(ws::DevicePeaks& peaks, const ws::DevicePeaks& given) {
   if (given.gbps > 0) peaks.gbps = given.gbps;
 }
 
-/// All usable ones; says which others are not measured and why.
-std::vector<std::string> devices_that_open() {
-  std::vector<std::string> names;
-  for (const ws::DeviceInfo& device : ws::Device::list()) {
-    if (!device.unusable.empty()) continue;
-    try {
-      ws::Device::open(device.id);
-      names.push_back(device.id);
-    } catch (const ws::Error& error) {
-      say(device.id + " is left out: " + error.what());
+/// Those that were named, or all usable ones but, which it says, what does not open. What cannot be
+/// measured is refused before others take their time.
+std::vector<std::string> devices_to_measure(const BenchmarkArguments& a) {
+  std::vector<std::string> names = a.devices;
+  if (names.empty()) {
+    for (const ws::DeviceInfo& device : ws::Device::list()) {
+      if (device.unusable.empty()) names.push_back(device.id);
     }
   }
+  std::erase_if(names, [&a](const std::string& name) {
+    std::optional<ws::Device> device;
+    try {
+      device = ws::Device::open(name);
+    } catch (const ws::Error& error) {
+      if (!a.devices.empty()) throw;
+      say(name + " is left out: " + error.what());
+      return true;
+    }
+    if (a.filter == ws::Filter::device) require_device_filter(device->info());
+    return false;
+  });
   return names;
 }
 
@@ -132,12 +142,7 @@ void run_benchmark(BenchmarkArguments a) {
   for (const std::string& file : {a.output, a.plot}) {
     if (!file.empty()) ws::require_writable(file);
   }
-  if (a.devices.empty()) a.devices = devices_that_open();
-  // What cannot be measured is refused before others take their time.
-  for (const std::string& name : a.devices) {
-    const ws::Device device = ws::Device::open(name);
-    if (a.filter == ws::Filter::device) require_device_filter(device.info());
-  }
+  a.devices = devices_to_measure(a);
   Json rows = Json::array();
   std::vector<PlotBar> bars;
   if (!a.as_json) print_header(a.runs);

@@ -65,7 +65,7 @@ int view_in_name(const fs::path& map, const fs::path& set) {
     int view = 0;
     const char* end = number.data() + number.size();
     const auto [rest, error] = std::from_chars(number.data(), end, view);
-    if (number.empty() || error != std::errc() || rest != end || view < 0) continue;
+    if (error != std::errc() || rest != end || view < 0) continue;
     if (set.empty() || fs::exists(set / ("depth" + number + ".tiff"))) return view;
   }
   return 0;

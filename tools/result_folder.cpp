@@ -48,11 +48,13 @@ void append_files(const Json& record, std::vector<std::string>& files) {
   }
 }
 
-/// Files of an earlier run but its record, and of one that ended while it replaced that.
+/// Files of an earlier run, and of one that ended while it replaced that, the record first; none
+/// where the folder holds no result.
 std::vector<std::string> earlier_files(const fs::path& folder) {
-  std::vector<std::string> files;
+  std::vector<std::string> files = {result_record};
   append_files(record_in(folder), files);
   append_files(json_in(folder / interrupted_record), files);
+  if (files.size() == 1) files.clear();
   return files;
 }
 
@@ -65,8 +67,7 @@ std::vector<std::string> all_files_of(const Json& record) {
 
 /// Throws Error where something that is no file of an earlier run has a name of the new ones.
 void require_no_other_files(const fs::path& folder, const Json& record) {
-  std::vector<std::string> earlier = earlier_files(folder);
-  if (!earlier.empty()) earlier.emplace_back(result_record);
+  const std::vector<std::string> earlier = earlier_files(folder);
   for (const std::string& file : all_files_of(record)) {
     if (std::find(earlier.begin(), earlier.end(), file) != earlier.end()) continue;
     if (!fs::exists(fs::symlink_status(folder / file))) continue;
@@ -88,9 +89,7 @@ void note_files(const fs::path& folder, const Json& record) {
 /// Removes what the record of an earlier run names, nothing else. The record goes first: without it
 /// the folder is not complete.
 void remove_earlier_result(const fs::path& folder) {
-  std::vector<std::string> files = earlier_files(folder);
-  if (!files.empty()) files.insert(files.begin(), result_record);
-  for (const std::string& file : files) {
+  for (const std::string& file : earlier_files(folder)) {
     std::error_code error;
     fs::remove(folder / file, error);
     if (error) {

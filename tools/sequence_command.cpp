@@ -121,10 +121,12 @@ Selection select_frames(const SequenceArguments& a) {
   require_different_cameras(cameras);
   const ChosenFrames frames = a.frames.choose(a.dataset, cameras);
   Selection selection;
-  for (const std::size_t i : frames.chosen) selection.frames.push_back(frames.all[i]);
-  for (const ws::SequenceFrame& frame : selection.frames) {
-    require_not_among(a.output, frame.images);
+  std::vector<fs::path> files;
+  for (const std::size_t i : frames.chosen) {
+    const ws::SequenceFrame& frame = selection.frames.emplace_back(frames.all[i]);
+    files.insert(files.end(), frame.images.begin(), frame.images.end());
   }
+  require_not_among(a.output, files);
   const auto& [start, images] = first_with_content(selection.frames, a.white_level);
   selection.calibrated = a.rig.rig_for_images(cameras.size(), images.front().size());
   selection.rig = selection.calibrated;
