@@ -12,6 +12,7 @@
 #include "subpixel.glsl"
 #include "plane_fit.glsl"
 #include "regression.glsl"
+#include "merging.glsl"
 #include "transfer.glsl"
 #include "structure.glsl"
 #include "check.glsl"

@@ -29,4 +29,5 @@ KERNEL(adopt_point, REFERENCE)      // takes regressed planes over whose costs f
 KERNEL(renew_point, REFERENCE)      // starts a view from moved planes whose costs follow later
 KERNEL(check_for_vote, REFERENCE)   // consistency and reasons, and what the other view shows
 KERNEL(structure, REFERENCE)        // what the intensities around tell distances by (kept where the priors go)
+KERNEL(merge, REFERENCE)            // averages over the planes of all views
 #undef KERNEL

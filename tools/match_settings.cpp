@@ -124,6 +124,8 @@ void MatchSettings::add_to(CLI::App& command, CLI::Option* no_warm_start) {
       "--vote-radius", &Options::vote_radius,
       "Then pixels take the plane for which planes up to this many pixels away and the other "
       "view's intensities speak most; 0 = do not");
+  add_pyramid("--merge-views", &Options::merge_views,
+              "Then planes of different views that agree are averaged: true or false");
   add_pyramid(
       "--normal-vote", &Options::normal_vote,
       "At the end pixels take the normal that most planes around agree with: true or false");

@@ -128,6 +128,9 @@ struct Options {
   /// for which the planes up to this many pixels away and likeness of intensity in the other view
   /// speak most, 0..64; 0 = it keeps its own.
   int vote_radius = 10;
+  /// Then the inverse distances of a pixel's plane and of those that other views hold for the same
+  /// point, within half a pixel of displacement, are averaged: part of their noise is their own.
+  bool merge_views = true;
   /// At the end, pixels take the normal, of those around, that most planes around agree with.
   bool normal_vote = true;
   /// Share of its cost by which the nearest planes must match better than the farthest, so that sky

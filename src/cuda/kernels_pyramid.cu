@@ -13,7 +13,7 @@ struct Get {
         KERNEL_ENTRY(check, C),       KERNEL_ENTRY(adopt_fill, C),  KERNEL_ENTRY(vote, C),
         KERNEL_ENTRY(renew_point, C), KERNEL_ENTRY(subpixel, C),    KERNEL_ENTRY(ambiguity, C),
         KERNEL_ENTRY(adopt_point, C), KERNEL_ENTRY(vote_normal, C), KERNEL_ENTRY(check_for_vote, C),
-        KERNEL_ENTRY(fill, C),        KERNEL_ENTRY(structure, C)};
+        KERNEL_ENTRY(fill, C),        KERNEL_ENTRY(structure, C),   KERNEL_ENTRY(merge, C)};
     return table_of(entries);
   }
 };

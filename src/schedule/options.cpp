@@ -168,6 +168,7 @@ std::string to_json(const Options& o) {
       {"regression_precision", o.regression_precision},
       {"subpixel_match", o.subpixel_match},
       {"vote_radius", o.vote_radius},
+      {"merge_views", o.merge_views},
       {"normal_vote", o.normal_vote},
       {"repair_radius", o.repair_radius},
       {"far_preference", o.far_preference},

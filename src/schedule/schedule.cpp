@@ -267,7 +267,9 @@ class Builder {
         repair_and_vote();
       }
     }
-    if (options_.level_regressions.back() > 0) find_normals();
+    if (options_.level_regressions.back() == 0) return;
+    merge();
+    find_normals();
   }
 
   void find_normals() {
@@ -386,6 +388,7 @@ class Builder {
               last ? until_vote() : Kernel::adopt_point, warm_regression_steps());
     }
     repair_and_vote();
+    merge();
   }
 
   void iterate(Views views, int iterations) {
@@ -537,6 +540,14 @@ class Builder {
   bool costs_follow_in_warm_frames() const {
     return options_.search == SearchMethod::pyramid && options_.warm_regressions > 0 &&
            options_.vote_radius > 0;
+  }
+
+  /// After everything that compares the views' planes as they came about, but for the checks. The
+  /// costs of before lie near enough.
+  void merge() {
+    if (!options_.merge_views) return;
+    add(Kernel::merge, pass_of(views_of(0)), views_of(0), 0);
+    add(Kernel::adopt_point, pass_of(views_of(0)), views_of(0), 0);
   }
 
   void vote() {

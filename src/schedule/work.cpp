@@ -166,6 +166,8 @@ Traffic traffic_of(const Dispatch& dispatch, int sources) {
     case Kernel::regress:
     case Kernel::vote_normal:
       return {seen | plane | checks, 0, prior};
+    case Kernel::merge:
+      return {ray | plane, plane, prior};
     case Kernel::adopt:
       return {prior | plane | seen, texels, plane};
     case Kernel::adopt_point:

@@ -37,6 +37,7 @@ const std::vector<GivenOption> options_of_fast = {
     {"--subpixel-match", "false", "subpixel_match", false},
     {"--repair-radius", "16", "repair_radius", 16},
     {"--vote-radius", "6", "vote_radius", 6},
+    {"--merge-views", "false", "merge_views", false},
     {"--normal-vote", "false", "normal_vote", false},
     {"--far-preference", "0.035", "far_preference", 0.035},
     {"--step-pixels", "0.75", "step_pixels", 0.75},

@@ -240,6 +240,37 @@ TEST(Passes, OfNormalsComeLastAndMayBeVotedOn) {
                                                Kernel::structure, Kernel::check));
 }
 
+/// Normals are those of merged distances; until then each view's planes are its own.
+TEST(Passes, MergeTheViewsOnceAfterTheLastVoteAndBeforeNormals) {
+  const Rig rig = rig_of(2);
+  const auto around_merge = [](const Schedule& schedule) {
+    std::vector<Kernel> kernels;
+    for (std::size_t i = 0; i < schedule.dispatches.size(); ++i) {
+      if (schedule.dispatches[i].kernel != Kernel::merge) continue;
+      EXPECT_EQ(schedule.dispatches[i].views, 2) << "at once, as each reads the other's planes";
+      for (std::size_t j = i - 2; j <= i + 2; ++j) {
+        kernels.push_back(schedule.dispatches[j].kernel);
+      }
+    }
+    return kernels;
+  };
+  using ::testing::ElementsAre;
+  using ::testing::IsEmpty;
+  for (const char* preset : {"fast", "quality"}) {
+    Options options = Options::preset_named(preset);
+    EXPECT_THAT(around_merge(make_schedule(rig, options)),
+                ElementsAre(Kernel::vote, Kernel::adopt, Kernel::merge, Kernel::adopt_point,
+                            Kernel::measure));
+    EXPECT_THAT(around_merge(make_warm_schedule(rig, options)),
+                ElementsAre(Kernel::vote, Kernel::adopt, Kernel::merge, Kernel::adopt_point,
+                            Kernel::structure));
+    options.merge_views = false;
+    EXPECT_THAT(around_merge(make_schedule(rig, options)), IsEmpty());
+    EXPECT_THAT(around_merge(make_warm_schedule(rig, options)), IsEmpty());
+  }
+  EXPECT_THAT(around_merge(make_schedule(rig, Options::preset_named("paper"))), IsEmpty());
+}
+
 TEST(Passes, OfRepairsSpareMatchesAndThoseOfTheFillingDoNot) {
   Options options = Options::preset_named("fast");
   options.fill_radius = 20;
