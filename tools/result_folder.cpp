@@ -162,10 +162,10 @@ class ViewWriter {
  private:
   cv::Mat textured_pixels() const {
     // As it was matched.
-    cv::Mat grey;
-    ws::to_intensity(contents_.images[index_], "The image of " + view_.name)
-        .convertTo(grey, CV_8U, 255 * result_.gain);
-    return ws::textured_pixels(grey, (result_.reasons & ws::reason_no_ray) == 0);
+    const cv::Mat field_of_view = (result_.reasons & ws::reason_no_ray) == 0;
+    const cv::Mat grey = ws::to_stretched_grey_levels(
+        contents_.images[index_], "The image of " + view_.name, field_of_view, result_.gain);
+    return ws::textured_pixels(grey, field_of_view);
   }
 
   fs::path named(const std::string& what, const std::string& extension) {

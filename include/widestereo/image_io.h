@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 
 #include "widestereo/error.h"
@@ -36,8 +37,12 @@ inline constexpr double usual_max_gain = 20;
 
 /// Intensities as grey levels 0 to 255, CV_8UC1.
 cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name);
-/// The same of intensities multiplied by their contrast_gain().
-cv::Mat to_stretched_grey_levels(const cv::Mat& image, const std::string& name);
+/// The same of intensities multiplied by `gain`, by default their contrast_gain() within
+/// `field_of_view` (empty, or CV_8UC1 of the image's size, 0 = outside). Those of hazy images are
+/// lowered first, so that none of their contrast is cut off at white.
+cv::Mat to_stretched_grey_levels(const cv::Mat& image, const std::string& name,
+                                 const cv::Mat& field_of_view = {},
+                                 std::optional<double> gain = std::nullopt);
 /// Of a file, as read_image() reads it.
 cv::Mat read_grey_levels(const std::filesystem::path& path);
 

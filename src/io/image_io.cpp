@@ -33,6 +33,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t largest_file = 4ull << 30;
 constexpr double white_of_16_bits = 65535;
+constexpr double least_contrast = 0.25, contrast_outliers = 0.02;
 
 std::vector<uchar> read_bytes(const fs::path& path) {
   const fs::file_type type = type_of(path);
@@ -301,9 +302,8 @@ std::pair<double, double> intensity_range(const cv::Mat& intensity, double outli
 }
 
 double contrast_gain(const cv::Mat& intensity, double most) {
-  constexpr double least_contrast = 0.25, outliers = 0.02;
   if (most <= 1) return 1;
-  const auto [darkest, brightest] = intensity_range(intensity, outliers);
+  const auto [darkest, brightest] = intensity_range(intensity, contrast_outliers);
   const double contrast = brightest - darkest;
   return std::clamp(least_contrast / std::max(contrast, least_contrast / most), 1.0, most);
 }
@@ -314,10 +314,21 @@ cv::Mat to_grey_levels(const cv::Mat& image, const std::string& name) {
   return grey;
 }
 
-cv::Mat to_stretched_grey_levels(const cv::Mat& image, const std::string& name) {
+cv::Mat to_stretched_grey_levels(const cv::Mat& image, const std::string& name,
+                                 const cv::Mat& field_of_view, std::optional<double> gain) {
   const cv::Mat intensity = to_intensity(image, name);
+  require_optional_map(field_of_view, image.size(), CV_8UC1, "The mask of the field of view");
+  cv::Mat seen = intensity;
+  if (!field_of_view.empty()) {
+    seen = intensity.clone();
+    seen.setTo(-1, field_of_view == 0);
+  }
+  const double factor = gain ? *gain : contrast_gain(seen, usual_max_gain);
+  // As much is left below the darkest as the range is wide, for outliers.
+  const double darkest = factor * intensity_range(seen, contrast_outliers).first;
+  const double offset = factor > 1 ? std::max(darkest - least_contrast, 0.0) : 0;
   cv::Mat grey;
-  intensity.convertTo(grey, CV_8U, 255 * contrast_gain(intensity, usual_max_gain));
+  intensity.convertTo(grey, CV_8U, 255 * factor, -255 * offset);
   return grey;
 }
 

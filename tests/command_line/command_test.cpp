@@ -440,6 +440,40 @@ TEST_F(Command, BlankImagesAreNamed) {
   EXPECT_EQ(run(depth_of("left.png", "right.png")).output.find("blank"), std::string::npos);
 }
 
+/// A veil of light changes neither correlations nor deviations.
+TEST_F(Command, HazyImagesHaveAsMuchTextureAsDarkOnes) {
+  cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
+  const auto textured = [this](double veil) {
+    for (const std::string camera : {"left", "right"}) {
+      cv::Mat image = cv::imread(file(camera + ".png"));
+      image.convertTo(image, CV_8U, 0.1, veil);
+      cv::imwrite(file(camera + "_veiled.png"), image);
+    }
+    const std::string pair = file("left_veiled.png") + " " + file("right_veiled.png");
+    const std::string calibration = " --json -c " + file("calib.yaml");
+    const nlohmann::json matched =
+        json_of(run(depth_of("left_veiled.png", "right_veiled.png") + "--max-gain 20 --json"));
+    const nlohmann::json scored =
+        json_of(run("evaluate " + file("far.tiff") + " --truth " + file("far.tiff") + " --image " +
+                    file("left_veiled.png") + calibration));
+    const nlohmann::json warped =
+        json_of(run("view-synthesis " + file("far.tiff") + " " + pair + calibration));
+    EXPECT_EQ(scored["regions"][5]["region"], "textured");
+    EXPECT_GT(warped["above_0.9"].get<double>(), 0.99) << veil;
+    return std::array{matched["views"][0]["textured_pixels"].get<double>(),
+                      scored["regions"][5]["pixels"].get<double>(),
+                      warped["windows"].get<double>()};
+  };
+  const std::array of_dark = textured(0);
+  for (const double veil : {70, 140, 200}) {
+    const std::array of_hazy = textured(veil);
+    for (std::size_t i = 0; i < of_dark.size(); ++i) {
+      EXPECT_GT(of_dark[i], 5000);
+      EXPECT_NEAR(of_hazy[i], of_dark[i], 0.02 * of_dark[i]) << veil << " " << i;
+    }
+  }
+}
+
 /// The same images with eight bits, and with these in files of 16.
 class FewerBits : public Command {
  protected:

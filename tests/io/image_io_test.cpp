@@ -16,6 +16,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
+#include <utility>
 
 #include "bytes_of.h"
 #include "comma_locale.h"
@@ -244,6 +246,37 @@ TEST(Images, OfLittleContrastAreStretched) {
   cv::minMaxLoc(to_stretched_grey_levels(of_10_bits, "x"), nullptr, &brightest);
   EXPECT_NEAR(brightest, 0.25 / 0.96 * 255, 2);
   EXPECT_TRUE(same_bits(to_stretched_grey_levels(ramp, "x"), to_grey_levels(ramp, "x")));
+}
+
+TEST(Images, ThatAreHazyAreStretchedWithoutCuttingOffWhatIsBright) {
+  cv::Mat ramp(10, 100, CV_32FC1);
+  for (int x = 0; x < ramp.cols; ++x) ramp.col(x) = x / 99.0;
+  const auto ends = [](const cv::Mat& image, const cv::Mat& field_of_view,
+                       std::optional<double> gain) {
+    double darkest = 0, brightest = 0;
+    cv::minMaxLoc(to_stretched_grey_levels(image, "x", field_of_view, gain).row(0), &darkest,
+                  &brightest);
+    return std::pair(darkest, brightest);
+  };
+  const double range = 0.25 / 0.96 * 255;
+  for (const double veil : {0.3, 0.5, 0.7, 0.9}) {
+    const auto [darkest, brightest] = ends(0.1 * ramp + veil, {}, std::nullopt);
+    EXPECT_NEAR(brightest - darkest, range, 2) << veil;
+    EXPECT_GT(darkest, 50) << "room for outliers";
+  }
+  const auto [darkest, brightest] = ends(0.1 * ramp + 0.9, {}, 5);
+  EXPECT_NEAR(brightest - darkest, 0.1 * 5 * 255, 2) << "by a gain that is known";
+  const cv::Mat bright = 0.1 * ramp + 0.9;
+  EXPECT_TRUE(same_bits(to_stretched_grey_levels(bright, "x", {}, 1), to_grey_levels(bright, "x")));
+  // A black rim is none of what is seen.
+  cv::Mat rim = 0.1 * ramp + 0.9, field_of_view(10, 100, CV_8UC1, cv::Scalar(255));
+  rim.rowRange(5, 10) = 0;
+  field_of_view.rowRange(5, 10) = 0;
+  EXPECT_EQ(ends(rim, field_of_view, std::nullopt), ends(0.1 * ramp + 0.9, {}, std::nullopt));
+  EXPECT_NE(error_of([&] {
+              to_stretched_grey_levels(ramp, "x", field_of_view.colRange(0, 9));
+            }).find("mask of the field of view is 9x10"),
+            std::string::npos);
 }
 
 TEST(Images, OfFewerBitsAreStretched) {
