@@ -13,7 +13,9 @@
 #include "map_checks.h"
 #include "option_checks.h"
 #include "result_folder.h"
+#include "rig_settings.h"
 #include "say.h"
+#include "white_level.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
@@ -35,9 +37,16 @@ struct EvaluateArguments {
   double png_scale = FolderFormat::usual_png_scale;
   double truth_png_scale = FolderFormat::usual_png_scale;
   double far_distance = 0;  ///< metres, 0: do not score what has no ground truth
+  WhiteLevel white_level;
   std::string error_map;
   bool as_json = false;
 };
+
+/// With the white level that the map was matched with, where none is given.
+cv::Mat read_matched_image(const EvaluateArguments& a) {
+  const double recorded = recorded_number(a.prediction, "/input/white_level").value_or(0);
+  return a.white_level.read(a.image, static_cast<int>(recorded));
+}
 
 /// One for each pixel, in an 8-bit grey image: as GroundTruth has them.
 cv::Mat read_labels(const fs::path& path) {
@@ -154,8 +163,7 @@ void run_evaluate(EvaluateArguments a) {
   if (!a.valid.empty()) truth.valid = read_labels(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = read_map(a.truth_normals, 3, "a normal map");
-  if (!a.image.empty())
-    truth.image = ws::to_stretched_grey_levels(ws::read_image(a.image), a.image);
+  if (!a.image.empty()) truth.image = read_matched_image(a);
   if (!a.normals.empty() && a.truth_normals.empty()) {
     throw ws::Error("--normals needs --truth-normals, or a folder with them by --set.");
   }
@@ -183,6 +191,9 @@ void run_evaluate(EvaluateArguments a) {
   if (a.view < 0 || a.view >= views || a.source < 0 || a.source >= views || a.view == a.source) {
     throw ws::Error(a.calibration + " has " + std::to_string(views) +
                     " camera(s); choose two different ones by --view and --source.");
+  }
+  if (!a.image.empty()) {
+    truth.image = stretched_within_view(truth.image, rig.views[a.view], a.image);
   }
   const std::vector<ws::RegionScores> scores =
       ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
@@ -238,6 +249,7 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--truth-normals", a->truth_normals, "Ground truth of the normals");
   command->add_option("--image", a->image,
                       "The view's image: scores textured surfaces, and their interiors, as well");
+  a->white_level.add_to(*command);
   CLI::Option* far_distance =
       command
           ->add_option("--far-distance", a->far_distance,

@@ -297,6 +297,18 @@ Eigen::Isometry3d viewpoint_behind(const Eigen::Isometry3d& world_from_camera,
 
 Json record_in(const fs::path& folder) { return json_in(folder / result_record); }
 
+std::optional<double> recorded_number(const fs::path& file, const std::string& pointer) {
+  const Json record = record_in(file.parent_path());
+  std::vector<std::string> files;
+  append_files(record, files);
+  const Json::json_pointer at(pointer);
+  if (std::find(files.begin(), files.end(), file.filename().string()) == files.end() ||
+      !record.contains(at) || !record.at(at).is_number()) {
+    return std::nullopt;
+  }
+  return record.at(at).get<double>();
+}
+
 std::vector<std::string> files_of(const Json& record) {
   std::vector<std::string> files;
   if (!record.is_object() || !record.contains("views")) return files;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,10 @@ struct FolderContents {
 
 /// The record in a result folder; discarded where there is none.
 nlohmann::ordered_json record_in(const std::filesystem::path& folder);
+/// What the record beside a file, which names it among its files, has at a JSON pointer, such as
+/// "/input/white_level"; none where there is no number.
+std::optional<double> recorded_number(const std::filesystem::path& file,
+                                      const std::string& pointer);
 /// Names of the files that a record says are in its folder; none where it is no record.
 std::vector<std::string> files_of(const nlohmann::ordered_json& record);
 

@@ -16,6 +16,13 @@ namespace ws = widestereo;
 
 namespace {
 
+/// 255 where a pixel has a ray and the mask, which may be empty, does not exclude it, else 0.
+cv::Mat field_of_view(const ws::Camera& camera, const cv::Mat& mask) {
+  cv::Mat usable;
+  cv::extractChannel(ws::ray_image(camera, mask), usable, 3);
+  return usable != 0;
+}
+
 /// One of the files of a rig in formats that have one for each camera.
 bool is_of_one_camera(const ws::Calibration& calibration) {
   return calibration.files.size() == 1 && (calibration.format == ws::CalibrationFormat::euroc ||
@@ -26,14 +33,9 @@ bool is_of_one_camera(const ws::Calibration& calibration) {
 /// may be of a vehicle's bonnet alone.
 bool mask_leaves_out(const ws::View& view, double theta) {
   if (view.mask.empty()) return false;
-  const auto seen_by = [](const ws::Camera& camera) {
-    cv::Mat usable;
-    cv::extractChannel(ws::ray_image(camera, {}), usable, 3);
-    return cv::Mat(usable != 0);
-  };
   ws::Camera within = view.camera;
   within.max_theta = theta;
-  const cv::Mat beyond = seen_by(view.camera) & ~seen_by(within);
+  const cv::Mat beyond = field_of_view(view.camera, {}) & ~field_of_view(within, {});
   return 2 * cv::countNonZero(beyond & (view.mask != 0)) < cv::countNonZero(beyond);
 }
 
@@ -112,6 +114,11 @@ ws::CalibratedImages RigSettings::images_of(const ws::SfmModel& model,
   ws::CalibratedImages images = model.calibrated_files({files.begin(), files.end()});
   limit_fields_of_view(images.rig);
   return images;
+}
+
+cv::Mat stretched_within_view(const cv::Mat& image, const ws::View& view, const std::string& name) {
+  ws::require_calibrated_size(image, view, name);
+  return ws::to_stretched_grey_levels(image, name, field_of_view(view.camera, view.mask));
 }
 
 void add_mask(ws::View& view, const cv::Mat& mask, const std::string& name) {

@@ -11,6 +11,11 @@
 #include "widestereo/rig.h"
 #include "widestereo/sfm_model.h"
 
+/// ws::to_stretched_grey_levels() of a view's image within the lens and the mask, as it is matched.
+/// `name`, the file, begins messages.
+cv::Mat stretched_within_view(const cv::Mat& image, const widestereo::View& view,
+                              const std::string& name);
+
 /// Ignores what a mask ignores, besides what the view's own does. `name`, the file, begins
 /// messages.
 void add_mask(widestereo::View& view, const cv::Mat& mask, const std::string& name);

@@ -39,10 +39,12 @@ void run_synthesis(const SynthesisArguments& a) {
     require_other_file(a.picture, read);
   }
   require_different_images({a.image, a.other});
-  cv::Mat image = ws::to_stretched_grey_levels(a.white_level.read(a.image), a.image);
-  cv::Mat other = ws::to_stretched_grey_levels(a.white_level.read(a.other), a.other);
+  cv::Mat image = a.white_level.read(a.image);
+  cv::Mat other = a.white_level.read(a.other);
   const ws::Rig rig =
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
+  image = stretched_within_view(image, rig.views[0], a.image);
+  other = stretched_within_view(other, rig.views[1], a.other);
   require_scaled_png("--png-scale", a.png_scale, a.distance);
   const cv::Mat distance = ws::read_map(a.distance, a.png_scale);
   require_values(distance, a.distance, 1, "a distance map");

@@ -16,10 +16,13 @@ void WhiteLevel::add_to(CLI::App& command) {
       ->check(CLI::Range(255, 65535));
 }
 
-cv::Mat WhiteLevel::read(const std::filesystem::path& file) const {
+cv::Mat WhiteLevel::read(const std::filesystem::path& file, int otherwise) const {
   constexpr int of_10_bits = 1023, of_12_bits = 4095;
   const cv::Mat image = ws::read_image(file);
   if (value_ > 0) return ws::stretched(image, value_, file.string());
+  if (otherwise > 0 && image.depth() == CV_16U) {
+    return ws::stretched(image, otherwise, file.string());
+  }
   if (told_ || image.depth() != CV_16U) return image;
   const double brightest = ws::largest_value(image);
   if (brightest > of_12_bits) return image;

@@ -11,8 +11,9 @@ class WhiteLevel {
   /// Adds --white-level.
   void add_to(CLI::App& command);
   /// As ws::read_image(), stretched to all of 16 bits where a level is given. Where none is, says
-  /// so once of a 16-bit image that looks as if one were needed.
-  cv::Mat read(const std::filesystem::path& file) const;
+  /// so once of a 16-bit image that looks as if one were needed. `otherwise`: of a 16-bit image
+  /// where none is given, 0 = not known.
+  cv::Mat read(const std::filesystem::path& file, int otherwise = 0) const;
   /// The same of a file among many that can do without it: the message says how.
   cv::Mat read_of_many(const std::filesystem::path& file) const;
   /// 0: none given.

@@ -528,6 +528,55 @@ TEST_F(FewerBits, AreNotCalledBlankNorWithoutTexture) {
   EXPECT_GT(textured("left16.png", "right16.png"), 0.4 * usual);
 }
 
+TEST_F(FewerBits, AreScoredAsTheyWereMatched) {
+  ASSERT_EQ(run(depth_of("left16.png", "right16.png") + "--white-level 255").exit_code, 0);
+  cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2)));
+  const auto textured = [this](const std::string& map, const std::string& image,
+                               const std::string& more = "") {
+    const nlohmann::json scores =
+        json_of(run("evaluate " + file(map) + " --truth " + file("far.tiff") + " -c " +
+                    file("calib.yaml") + " --json --image " + file(image) + more));
+    EXPECT_EQ(scores["regions"][5]["region"], "textured");
+    return scores["regions"][5]["pixels"].get<double>();
+  };
+  const double of_8_bits = textured("far.tiff", "left.png");
+  EXPECT_GT(of_8_bits, 5000);
+  EXPECT_LT(textured("far.tiff", "left16.png"), 0.5 * of_8_bits) << "taken for a dark image";
+  EXPECT_EQ(textured("far.tiff", "left16.png", " --white-level 255"), of_8_bits);
+  EXPECT_EQ(textured("out/distance0.tiff", "left16.png"), of_8_bits) << "by the record";
+  EXPECT_EQ(textured("out/distance0.tiff", "left.png"), of_8_bits) << "which is not of 8 bits";
+  EXPECT_LT(textured("out/distance0.tiff", "left16.png", " --white-level 65535"), of_8_bits);
+}
+
+/// What a lens does not show is as black as nothing in a hazy image.
+TEST_F(Command, BlackRimsAreNoContrast) {
+  cv::imwrite(file("far.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(1e6)));
+  folder_.write("narrow.yaml", bytes_of("calib.yaml") + "  max_theta_deg: 70\n");
+  folder_.write("narrow.yaml", replaced(bytes_of("narrow.yaml"), "97.5", "70"));
+  const Rig rig = read_calibration(file("narrow.yaml")).rig;
+  const auto textured = [&](int rim) {
+    for (int i = 0; i < 2; ++i) {
+      const std::string camera = i == 0 ? "left" : "right";
+      cv::Mat image = cv::imread(file(camera + ".png"), cv::IMREAD_GRAYSCALE), rays;
+      image.convertTo(image, CV_8U, 0.1, 140);
+      cv::extractChannel(ray_image(rig.views[static_cast<std::size_t>(i)].camera, {}), rays, 3);
+      image.setTo(rim, rays == 0);
+      cv::imwrite(file(camera + "_rim.png"), image);
+    }
+    const std::string calibration = " --json -c " + file("narrow.yaml");
+    const nlohmann::json scored =
+        json_of(run("evaluate " + file("far.tiff") + " --truth " + file("far.tiff") + " --image " +
+                    file("left_rim.png") + calibration));
+    const nlohmann::json warped =
+        json_of(run("view-synthesis " + file("far.tiff ") + file("left_rim.png ") +
+                    file("right_rim.png") + calibration));
+    return std::array{scored["regions"][5]["pixels"].get<long>(), warped["windows"].get<long>()};
+  };
+  const std::array hazy = textured(150);
+  for (const long count : hazy) EXPECT_GT(count, 1000);
+  EXPECT_EQ(textured(0), hazy);
+}
+
 TEST_F(FewerBits, AreStretchedByEveryCommand) {
   const cv::Mat image = cv::imread(file("left16.png"), cv::IMREAD_UNCHANGED);
   cv::imwrite(file("left16.png"), image * 2);
@@ -541,6 +590,8 @@ TEST_F(FewerBits, AreStretchedByEveryCommand) {
        {"sequence " + file("data") + " -o " + file("frames") + quick,
         "reconstruct " + file("data") + " --min-views 1 --count 1 -o " + file("dense") + quick,
         "calibration check " + pair, "calibration refine " + pair + "-o " + file("refined.yaml "),
+        "evaluate " + file("far.tiff") + " --truth " + file("far.tiff") + " --image " +
+            file("left16.png "),
         "view-synthesis " + file("far.tiff ") + pair}) {
     const std::string arguments = command + "-c " + file("calib.yaml") + " ";
     EXPECT_NE(run(arguments).output.find(advice), std::string::npos) << arguments;

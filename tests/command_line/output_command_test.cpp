@@ -223,8 +223,9 @@ TEST_F(Output, LackOfMemoryIsNamed) {
   cv::imwrite(file("big.png"), cv::Mat(12000, 12000, CV_8UC1, cv::Scalar(0)));
   const std::string big = file("big.png") + " ";
   const std::string other = file(copy_of("big.png")) + " ";
+  write_small_calibration(12000, 12000);
   const Outcome outcome =
-      run("view-synthesis " + big + big + other + "-c " + file("calib.yaml"), "ulimit -v 600000;");
+      run("view-synthesis " + big + big + other + "-c " + file("small.yaml"), "ulimit -v 600000;");
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(outcome.output, "widestereo: Not enough memory; use smaller images.\n");
 }
