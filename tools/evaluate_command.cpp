@@ -219,8 +219,8 @@ void run_evaluate(EvaluateArguments a) {
               << ", \"sparsification\": " << ws::to_json(curve)
               << ", \"reliability\": " << ws::to_json(bins) << "}\n";
   } else {
-    std::cout << ws::to_table(scores) << ws::to_table(far) << ws::to_table(curve)
-              << ws::to_table(bins);
+    std::cout << ws::to_table(scores) << (a.far_distance > 0 ? ws::to_table(far) : "")
+              << ws::to_table(curve) << ws::to_table(bins);
   }
 }
 

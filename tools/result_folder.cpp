@@ -230,6 +230,11 @@ class ViewWriter {
   Json files_;
 };
 
+/// "-" of no pixel.
+std::string share_text(double share) {
+  return std::isnan(share) ? "-" : ws::formatted("%.1f %%", 100 * share);
+}
+
 /// Those of rejected pixels, as "1 no ray, 2 no overlap".
 std::string reason_bits() {
   std::string bits;
@@ -353,16 +358,14 @@ void report(const Json& record, const fs::path& folder, bool as_json) {
               record["patch_samples"].get<double>() / 1e6,
               record["options"]["preset"].get<std::string>().c_str());
   for (const auto& view : record["views"]) {
+    const auto share = [&view](const char* key) { return share_text(view[key].get<double>()); };
     std::printf(
-        "%s: %.1f %% accepted, mean cost %s, cost < 0.2 %.1f %% (%.1f %% of textured pixels, "
-        "%.1f %% of those accepted), left-right within 2 %% %.1f %%, within 2 px %.1f %%\n",
-        view["name"].get<std::string>().c_str(), 100 * view["accepted"].get<double>(),
-        cost_text(view["mean_cost"].get<double>()).c_str(),
-        100 * view["cost_below_0.2"].get<double>(),
-        100 * view["cost_below_0.2_textured"].get<double>(),
-        100 * view["cost_below_0.2_textured_accepted"].get<double>(),
-        100 * view["consistent_within_2_percent"].get<double>(),
-        100 * view["consistent_within_2_pixels"].get<double>());
+        "%s: %s accepted, mean cost %s, cost < 0.2 %s (%s of textured pixels, %s of those "
+        "accepted), left-right within 2 %% %s, within 2 px %s\n",
+        view["name"].get<std::string>().c_str(), share("accepted").c_str(),
+        cost_text(view["mean_cost"].get<double>()).c_str(), share("cost_below_0.2").c_str(),
+        share("cost_below_0.2_textured").c_str(), share("cost_below_0.2_textured_accepted").c_str(),
+        share("consistent_within_2_percent").c_str(), share("consistent_within_2_pixels").c_str());
   }
   std::printf("Results are in %s\n", folder.string().c_str());
 }

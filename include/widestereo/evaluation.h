@@ -87,7 +87,8 @@ struct FarScores {
   double distance = 0;  ///< metres along the ray, taken as true
   long pixels = 0;      ///< inside the field of view, without a true distance, and the point at
                         ///< `distance` projects into the source image
-  double right = 0;     ///< share of them whose predicted point lies within 2 px of that point
+  double right = 0;     ///< share of them whose predicted point lies within 2 px of that point; of
+                        ///< no pixel NaN (null in JSON)
 };
 
 /// `truth` needs a field of view; GroundTruth::valid has no part in it. `far_distance`: metres
@@ -95,17 +96,18 @@ struct FarScores {
 FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const View& reference,
                      const View& source, double far_distance);
 
-/// The scores as one line (empty for no pixels) and as JSON text.
+/// The scores as one line and as JSON text.
 std::string to_table(const FarScores& scores);
 std::string to_json(const FarScores& scores);
 
 /// Quality without ground truth, as in Table 1 of Hu et al.: shares over the pixels with a plane.
+/// Shares and means over no pixel are NaN (null in JSON).
 struct ConsistencyScores {
   double consistent_relative = 0;  ///< left-right difference of distance at most 2 %
   double consistent_pixels = 0;    ///< left-right displacement at most 2 px
   double low_cost = 0;             ///< cost 1 - ZNCC below 0.2
   double low_cost_textured = 0;    ///< the same, of the textured pixels with a plane
-  double mean_cost = 0;            ///< NaN where no pixel has a plane
+  double mean_cost = 0;
   long pixels = 0;
   long textured = 0;  ///< of these
 };
@@ -137,8 +139,8 @@ std::string to_json(const std::vector<SparsificationPoint>& curve);
 struct ReliabilityBin {
   double low = 0, high = 1;  ///< confidence: low <= c < high, 1 itself in the last one
   long pixels = 0;
-  double mean_confidence = 0;
-  double right = 0;  ///< share of the pixels
+  double mean_confidence = 0;  ///< NaN (null in JSON), as is the next, of no pixel
+  double right = 0;            ///< share of the pixels
 };
 
 /// Bins from 0 to 1 over all pixels, occluded ones too, that have a prediction and whose true point

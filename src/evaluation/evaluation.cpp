@@ -185,9 +185,14 @@ bool is_right(const Sample& sample) { return sample.displacement <= right_pixels
 /// What no pixel tells.
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
+/// A sum over so many pixels as their mean or, of ones, their share.
+double share_of(double sum, long pixels) {
+  return pixels == 0 ? unknown : sum / static_cast<double>(pixels);
+}
+
 double mean_of(const std::vector<double>& values) {
-  if (values.empty()) return unknown;
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  return share_of(std::accumulate(values.begin(), values.end(), 0.0),
+                  static_cast<long>(values.size()));
 }
 
 /// Share of values above a threshold; `missing` further ones count as above.
@@ -195,7 +200,7 @@ double share_above(const std::vector<double>& values, double threshold, std::siz
   const auto above = static_cast<std::size_t>(std::count_if(
       values.begin(), values.end(), [threshold](double value) { return value > threshold; }));
   const std::size_t total = values.size() + missing;
-  return total == 0 ? unknown : static_cast<double>(above + missing) / static_cast<double>(total);
+  return share_of(static_cast<double>(above + missing), static_cast<long>(total));
 }
 
 RegionScores score(const std::string& region, const std::vector<const Sample*>& samples) {
@@ -347,7 +352,7 @@ FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const Vi
                                                            expected) <= right_pixels;
     }
   }
-  scores.right = static_cast<double>(right) / static_cast<double>(std::max(scores.pixels, 1L));
+  scores.right = share_of(static_cast<double>(right), scores.pixels);
   return scores;
 }
 
@@ -372,12 +377,11 @@ ConsistencyScores consistency_scores(const cv::Mat& differences, const cv::Mat& 
       scores.low_cost_textured += c < 0.2f;
     }
   }
-  const double n = static_cast<double>(std::max(scores.pixels, 1L));
-  scores.mean_cost = scores.pixels == 0 ? unknown : scores.mean_cost / n;
-  scores.low_cost /= n;
-  scores.low_cost_textured /= static_cast<double>(std::max(scores.textured, 1L));
-  scores.consistent_relative /= n;
-  scores.consistent_pixels /= n;
+  for (double* sum : {&scores.mean_cost, &scores.low_cost, &scores.consistent_relative,
+                      &scores.consistent_pixels}) {
+    *sum = share_of(*sum, scores.pixels);
+  }
+  scores.low_cost_textured = share_of(scores.low_cost_textured, scores.textured);
   return scores;
 }
 
@@ -418,9 +422,8 @@ std::vector<ReliabilityBin> reliability(const cv::Mat& distance, const cv::Mat& 
     bin.right += is_right(sample);
   }
   for (ReliabilityBin& bin : bins) {
-    if (bin.pixels == 0) continue;
-    bin.mean_confidence /= static_cast<double>(bin.pixels);
-    bin.right /= static_cast<double>(bin.pixels);
+    bin.mean_confidence = share_of(bin.mean_confidence, bin.pixels);
+    bin.right = share_of(bin.right, bin.pixels);
   }
   return bins;
 }

@@ -69,9 +69,9 @@ std::string to_json(const std::vector<RegionScores>& scores) {
 }
 
 std::string to_table(const FarScores& scores) {
-  if (scores.pixels == 0) return "";
-  return formatted("without ground truth: %ld pixels, %.1f%% within 2 px of %g m\n", scores.pixels,
-                   100 * scores.right, scores.distance);
+  const std::string right = scores.pixels == 0 ? "-" : formatted("%.1f%%", 100 * scores.right);
+  return formatted("without ground truth: %ld pixels, %s within 2 px of %g m\n", scores.pixels,
+                   right.c_str(), scores.distance);
 }
 
 std::string to_json(const FarScores& scores) {
@@ -106,10 +106,10 @@ std::string to_table(const std::vector<ReliabilityBin>& bins) {
   double above = 0;
   double right_above = 0;
   for (auto bin = bins.rbegin(); bin != bins.rend(); ++bin) {
+    if (bin->pixels == 0) continue;
     const auto pixels = static_cast<double>(bin->pixels);
     above += pixels;
     right_above += bin->right * pixels;
-    if (bin->pixels == 0) continue;
     lines.push_back(formatted("%4.2f to %4.2f %9.1f%% %10.3f %8.1f%% | %8.1f%% %8.1f%%\n", bin->low,
                               bin->high, 100 * pixels / total, bin->mean_confidence,
                               100 * bin->right, 100 * above / total, 100 * right_above / above));

@@ -132,6 +132,32 @@ TEST_F(Command, DepthScoresTexturedPixels) {
   EXPECT_LT(cv::countNonZero(accepted), planes) << "else the two shares are the same";
 }
 
+TEST_F(Command, SharesOfNoPixelAreUnknown) {
+  for (const char* name : {"left.png", "right.png"}) {
+    cv::Mat faint = cv::imread(file(name));
+    faint.convertTo(faint, CV_8U, 0.01, 100);
+    cv::imwrite(file(name), faint);
+  }
+  alter("right.png", 60);
+  const Outcome outcome = run(depth_of("left.png", "right.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find(" % (- of textured pixels, - of those accepted)"),
+            std::string::npos)
+      << outcome.output;
+  const nlohmann::json view = nlohmann::json::parse(bytes_of("out/result.json"))["views"][0];
+  EXPECT_EQ(view["textured_pixels"], 0);
+  for (const char* share : {"cost_below_0.2_textured", "cost_below_0.2_textured_accepted"}) {
+    EXPECT_TRUE(view[share].is_null()) << share;
+  }
+  cv::imwrite(file("none.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  const std::string evaluate = "evaluate " + file("out/distance0.tiff") + " --truth " +
+                               file("out/distance0.tiff") + " -c " + file("calib.yaml");
+  EXPECT_EQ(run(evaluate).output.find("without ground truth"), std::string::npos);
+  EXPECT_NE(run(evaluate + " --far-distance 50 --field-of-view " + file("none.png"))
+                .output.find("without ground truth: 0 pixels, - within"),
+            std::string::npos);
+}
+
 /// The pair of calib.yaml, taken by its first camera alone in two places.
 class MovingCamera : public Command {
  protected:

@@ -385,7 +385,10 @@ TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   const ConsistencyScores of_none =
       consistency_scores(differences, cv::Mat(1, 4, CV_32FC1, cv::Scalar(2)));
   EXPECT_EQ(of_none.pixels, 0);
-  EXPECT_TRUE(std::isnan(of_none.mean_cost)) << of_none.mean_cost;
+  for (const double share : {of_none.mean_cost, of_none.low_cost, of_none.low_cost_textured,
+                             of_none.consistent_relative, of_none.consistent_pixels}) {
+    EXPECT_TRUE(std::isnan(share)) << share;
+  }
 }
 
 TEST(Evaluation, MapsThatDoNotFitAreNamed) {
@@ -438,7 +441,7 @@ TEST_F(TexturedScene, LowCostIsAlsoCountedWhereThereIsTexture) {
   EXPECT_NEAR(s.low_cost, 22 * 21 / (23.0 * 40), 1e-9);
   const ConsistencyScores without = consistency_scores(differences, cost);
   EXPECT_EQ(without.textured, 0);
-  EXPECT_EQ(without.low_cost_textured, 0);
+  EXPECT_TRUE(std::isnan(without.low_cost_textured)) << without.low_cost_textured;
   EXPECT_EQ(without.low_cost, s.low_cost);
 }
 
@@ -454,6 +457,17 @@ TEST_F(FourPixels, WhatNoPixelTellsIsUnknown) {
   }
   EXPECT_TRUE(nlohmann::json::parse(to_json(scores))[0]["mean_absolute"].is_null());
   EXPECT_EQ(to_table(scores).find("nan"), std::string::npos) << to_table(scores);
+  truth_.field_of_view = nothing.clone();
+  truth_.field_of_view.convertTo(truth_.field_of_view, CV_8U);
+  const FarScores far = far_scores(nothing, truth_, reference_, source_, 50);
+  EXPECT_TRUE(std::isnan(far.right)) << far.right;
+  EXPECT_EQ(to_table(far), "without ground truth: 0 pixels, - within 2 px of 50 m\n");
+  EXPECT_TRUE(nlohmann::json::parse(to_json(far))["right"].is_null());
+  const auto bins = reliability(nothing, nothing, truth_, reference_, source_);
+  const nlohmann::json first = nlohmann::json::parse(to_json(bins))[0];
+  EXPECT_EQ(first["pixels"], 0);
+  EXPECT_TRUE(first["right"].is_null());
+  EXPECT_TRUE(first["mean_confidence"].is_null());
 }
 
 TEST_F(FourPixels, ConfidencesAreProbabilities) {
