@@ -54,7 +54,7 @@ void run_synthesis(const SynthesisArguments& a) {
                     "give the --max-image-size that the distances were matched with");
   const ws::SynthesisedView synthesised = ws::synthesise_view(
       distance, a.size.reduced(rig.views[0]), other, a.size.reduced(rig.views[1]));
-  const ws::SynthesisScores scores = ws::synthesis_scores(distance, image, synthesised);
+  const ws::SynthesisScores scores = ws::synthesis_scores(image, synthesised);
   if (scores.windows == 0) {
     throw ws::Error("There is no textured window to score in " + a.image + " that " + a.other +
                     " sees at the distances of " + a.distance +

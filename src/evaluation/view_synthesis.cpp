@@ -49,12 +49,14 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
     return cv::Point(static_cast<int>(place.x) / cell, static_cast<int>(place.y) / cell);
   };
   const PreparedCamera camera(view.camera), other_camera(other.camera);
+  SynthesisedView synthesised;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float d = distance.at<float>(y, x);
       Eigen::Vector3d ray;
       Eigen::Vector2d u;
       if (!has_distance(d) || is_masked(view, {x, y}) || !camera.unproject({x, y}, ray)) continue;
+      ++synthesised.distances;
       const Eigen::Vector3d point = motion * (static_cast<double>(d) * ray);
       if (!other_camera.project(point, u) || u.x() < 0 || u.y() < 0 ||
           u.x() > other_image.cols - 1 || u.y() > other_image.rows - 1 || is_masked(other, u)) {
@@ -66,7 +68,6 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
       first = std::min(first, range(y, x));
     }
   }
-  SynthesisedView synthesised;
   cv::Mat grey;
   other_image.convertTo(grey, CV_32F);
   cv::remap(grey, synthesised.image, places, {}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
@@ -82,12 +83,10 @@ SynthesisedView synthesise_view(const cv::Mat& distance, const View& view,
   return synthesised;
 }
 
-SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
-                                 const SynthesisedView& synthesised) {
+SynthesisScores synthesis_scores(const cv::Mat& image, const SynthesisedView& synthesised) {
   const cv::Size size = synthesised.image.size();
   require_type(synthesised.image, CV_32FC1, "The image of the synthesised view");
   require_map(synthesised.visible, size, CV_8UC1, "The map of what the synthesised view shows");
-  require_map(distance, size, CV_32FC1, "The distance map");
   require_map(image, size, CV_8UC1, "The image to compare");
   cv::Mat seen, a, b;
   synthesised.visible.convertTo(seen, CV_64F, 1 / 255.0);
@@ -99,11 +98,9 @@ SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
   const cv::Mat mean_aa = window_mean(a.mul(a)), mean_bb = window_mean(b.mul(b)),
                 mean_ab = window_mean(a.mul(b));
   SynthesisScores scores;
-  long with_distance = 0, visible = 0;
+  long visible = 0;
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
-      const float d = distance.at<float>(y, x);
-      with_distance += has_distance(d) ? 1 : 0;
       if (synthesised.visible.at<uchar>(y, x) == 0) continue;
       ++visible;
       const double n = share.at<double>(y, x);
@@ -122,7 +119,7 @@ SynthesisScores synthesis_scores(const cv::Mat& distance, const cv::Mat& image,
       scores.above_0_9 += zncc > 0.9 ? 1 : 0;
     }
   }
-  scores.visible = static_cast<double>(visible) / static_cast<double>(with_distance);
+  scores.visible = static_cast<double>(visible) / static_cast<double>(synthesised.distances);
   for (double* sum : {&scores.mean, &scores.above_0_7, &scores.above_0_8, &scores.above_0_9}) {
     *sum /= static_cast<double>(scores.windows);
   }

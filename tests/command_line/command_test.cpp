@@ -1322,6 +1322,13 @@ TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
   EXPECT_GT(right["above_0.9"].get<double>(), 0.99);
   EXPECT_GT(right["windows"].get<long>(), 5000);
   EXPECT_EQ(cv::imread(file("warped.png"), cv::IMREAD_UNCHANGED).size(), cv::Size(96, 96));
+  cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 48).setTo(0);
+  cv::imwrite(file("half.png"), mask);
+  cv::imwrite(file("whole.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  outcome = run(synthesis("far.tiff", " --json --mask " + file("half.png,") + file("whole.png")));
+  EXPECT_NEAR(json_of(outcome)["visible"].get<double>(), right["visible"].get<double>(), 0.05)
+      << "of what is not masked";
   outcome = run(synthesis("near.tiff", " --json"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   const std::size_t scores = outcome.output.find('{');
