@@ -37,7 +37,7 @@ cv::Mat reason_picture(const cv::Mat& reasons, const cv::Mat& image);
 cv::Mat cloud_picture(const PointCloud& cloud, const Eigen::Isometry3d& world_from_viewer,
                       cv::Size size);
 
-/// A picture (CV_8UC3) with a legend below, 64 pixels wide or more: the colour bar of
+/// A picture (CV_8UC3) with a legend below, 128 pixels wide or more: the colour bar of
 /// distance_picture() with distances in `unit`.
 cv::Mat with_distance_legend(const cv::Mat& picture, const ColourRange& range,
                              const std::string& unit = " m");
@@ -50,9 +50,9 @@ struct Panel {
   std::string title;
   cv::Mat picture;  ///< 8 or 16 bit, grey, BGR or BGRA
 };
-/// Panels side by side, `columns` in a row, each scaled to the width of the first (64 pixels or
-/// more) and titled. Throws Error where there are none or no columns, and for pictures of other
-/// types.
+/// Panels side by side, `columns` in a row, each scaled to the width of the first (128 pixels or
+/// more) and titled; farther apart where a title is wider. Throws Error where there are none or no
+/// columns, and for pictures of other types.
 cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns);
 
 }  // namespace widestereo

@@ -52,8 +52,8 @@ cv::Mat coloured(const cv::Mat& share, const cv::Mat& valid, int map) {
 
 double text_scale(const cv::Mat& picture) { return std::max(0.35, picture.cols / 900.0); }
 
-/// What legends and titles need.
-constexpr int least_width = 64;
+/// What the ends of a legend need.
+constexpr int least_width = 128;
 
 /// The picture above an empty strip for a legend, and beside one if it is too narrow.
 cv::Mat with_strip(const cv::Mat& picture, int height) {
@@ -71,11 +71,17 @@ cv::Size text_size(const std::string& text, double scale) {
   return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness_of_text(scale), &base);
 }
 
+/// Columns of a text at `x`, within a picture's.
+cv::Range extent(const std::string& text, int x, double scale, double align, int columns) {
+  const int width = text_size(text, scale).width;
+  const int begin =
+      std::clamp(x - static_cast<int>(align * width), 2, std::max(2, columns - width - 2));
+  return {begin, begin + width};
+}
+
 void put_text(cv::Mat& picture, const std::string& text, cv::Point at, double scale,
               double align = 0) {
-  const cv::Size size = text_size(text, scale);
-  const int x = std::clamp(at.x - static_cast<int>(align * size.width), 2,
-                           std::max(2, picture.cols - size.width - 2));
+  const int x = extent(text, at.x, scale, align, picture.cols).start;
   cv::putText(picture, text, {x, at.y}, cv::FONT_HERSHEY_SIMPLEX, scale, ink,
               thickness_of_text(scale), cv::LINE_AA);
 }
@@ -86,7 +92,8 @@ std::string metres(double value) {
   return formatted(form, value);
 }
 
-/// A horizontal bar from share 0 to 1 with labels at given shares.
+/// A horizontal bar from share 0 to 1 with labels at given shares, from one end to the other one;
+/// those between are left out where they would touch others.
 cv::Mat with_bar(const cv::Mat& picture, int map,
                  const std::vector<std::pair<double, std::string>>& labels) {
   const double scale = text_scale(picture);
@@ -101,10 +108,25 @@ cv::Mat with_bar(const cv::Mat& picture, int map,
   cv::Mat colours = coloured(ramp, cv::Mat(ramp.size(), CV_8U, 255), map);
   cv::resize(colours, result(bar), bar.size(), 0, 0, cv::INTER_NEAREST);
   cv::rectangle(result, bar, ink, 1);
-  for (const auto& [share, text] : labels) {
-    const int x = bar.x + static_cast<int>(share * (bar.width - 1));
+  const auto place_of = [&](std::size_t label) {
+    return bar.x + static_cast<int>(labels[label].first * (bar.width - 1));
+  };
+  const auto extent_of = [&](std::size_t label) {
+    return extent(labels[label].second, place_of(label), scale, 0.5, result.cols);
+  };
+  const int apart = line / 2;
+  const std::size_t last = labels.size() - 1;
+  int taken = -apart;
+  for (std::size_t i = 0; i <= last; ++i) {
+    const cv::Range here = extent_of(i);
+    const bool is_end = i == 0 || i == last;
+    if (!is_end && (here.start < taken + apart || here.end + apart > extent_of(last).start)) {
+      continue;
+    }
+    taken = here.end;
+    const int x = place_of(i);
     cv::line(result, {x, bar.y + bar.height}, {x, bar.y + bar.height + line / 5}, ink, 1);
-    put_text(result, text, {x, bar.y + bar.height + line}, scale, 0.5);
+    put_text(result, labels[i].second, {x, bar.y + bar.height + line}, scale, 0.5);
   }
   return result;
 }
@@ -270,6 +292,7 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
   const int gap = title / 3;
   std::vector<cv::Mat> pictures;
   int height = 0;
+  int cell = width;  // as wide as the widest title
   for (const Panel& panel : panels) {
     require_image(panel.picture, "The panel " + panel.title);
     cv::Mat picture = with_strip(to_bgr8(panel.picture), 0);
@@ -277,17 +300,19 @@ cv::Mat panel_sheet(const std::vector<Panel>& panels, int columns) {
     cv::resize(picture, picture, {width, std::max(1, static_cast<int>(picture.rows * factor))}, 0,
                0, factor < 1 ? cv::INTER_AREA : cv::INTER_NEAREST);
     height = std::max(height, picture.rows);
+    cell = std::max(cell, text_size(panel.title, scale).width);
     pictures.push_back(picture);
   }
   columns = std::min(columns, static_cast<int>(panels.size()));
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
-  cv::Mat sheet(rows * (height + title + gap) + gap, columns * (width + gap) + gap, CV_8UC3,
+  cv::Mat sheet(rows * (height + title + gap) + gap, columns * (cell + gap) + gap, CV_8UC3,
                 paper_colour);
   for (int i = 0; i < static_cast<int>(panels.size()); ++i) {
-    const cv::Point corner(gap + i % columns * (width + gap),
+    const cv::Point corner(gap + i % columns * (cell + gap),
                            gap + i / columns * (height + title + gap));
-    put_text(sheet, panels[i].title, {corner.x + width / 2, corner.y + title * 3 / 4}, scale, 0.5);
-    pictures[i].copyTo(sheet(cv::Rect(corner + cv::Point(0, title), pictures[i].size())));
+    put_text(sheet, panels[i].title, {corner.x + cell / 2, corner.y + title * 3 / 4}, scale, 0.5);
+    const cv::Point place = corner + cv::Point((cell - width) / 2, title);
+    pictures[i].copyTo(sheet(cv::Rect(place, pictures[i].size())));
   }
   return sheet;
 }

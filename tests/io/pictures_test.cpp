@@ -174,9 +174,9 @@ TEST(Pictures, SheetsAreNoWiderThanTheirPanels) {
 }
 
 TEST(Pictures, SheetHoldsAllPanels) {
-  const cv::Mat grey(50, 80, CV_8UC1, cv::Scalar(9));
-  const cv::Mat deep(100, 160, CV_16UC3, cv::Scalar(257 * 10, 257 * 20, 257 * 30));
-  const cv::Mat red(40, 80, CV_8UC4, cv::Scalar(0, 0, 200, 7));
+  const cv::Mat grey(100, 160, CV_8UC1, cv::Scalar(9));
+  const cv::Mat deep(200, 320, CV_16UC3, cv::Scalar(257 * 10, 257 * 20, 257 * 30));
+  const cv::Mat red(80, 160, CV_8UC4, cv::Scalar(0, 0, 200, 7));
   const cv::Mat sheet = panel_sheet({{"a", grey}, {"b", deep}, {"c", red}}, 2);
   ASSERT_EQ(sheet.type(), CV_8UC3);
   // Where a colour is in the sheet, of which it must fill a rectangle.
@@ -224,13 +224,53 @@ TEST(Pictures, LegendsOfReasonsFitNarrowPictures) {
   }
 }
 
+/// Groups of columns with ink that lie `apart` or more from each other.
+int labels_in(const cv::Mat& strip, int apart) {
+  cv::Mat grey, columns;
+  cv::cvtColor(strip, grey, cv::COLOR_BGR2GRAY);
+  cv::reduce(grey, columns, 0, cv::REDUCE_MIN);
+  int count = 0, blank = apart;
+  for (int x = 0; x < columns.cols; ++x) {
+    if (columns.at<uchar>(x) > 200) {
+      ++blank;
+      continue;
+    }
+    if (blank >= apart) ++count;
+    blank = 0;
+  }
+  return count;
+}
+
+TEST(Pictures, LabelsOfLegendsDoNotTouch) {
+  for (const auto& [cols, expected] :
+       {std::pair(64, 3), {128, 3}, {160, 3}, {256, 5}, {512, 5}, {1024, 5}}) {
+    const cv::Mat picture(10, cols, CV_8UC3, cv::Scalar::all(255));
+    const cv::Mat with = with_distance_legend(picture, {0.552, 12.3}, "m");
+    const int line = (with.rows - picture.rows) / 3;
+    const cv::Mat below = with.rowRange(picture.rows + line / 2 + line + line / 4 + 1, with.rows);
+    EXPECT_EQ(labels_in(below, line / 2), expected) << cols;
+  }
+}
+
+TEST(Pictures, TitlesOfPanelsDoNotTouch) {
+  for (const int cols : {64, 128, 512}) {
+    const cv::Mat picture(10, cols, CV_8UC3, cv::Scalar::all(255));
+    const auto titles = [&](const std::string& title) {
+      const cv::Mat sheet = panel_sheet({{title, picture}, {title, picture}, {title, picture}}, 3);
+      EXPECT_GE(sheet.cols, 3 * cols);
+      return labels_in(sheet, std::max(5, cols / 64));
+    };
+    EXPECT_EQ(titles("error:_green_0.5_%,_red_5_%"), 3) << cols;
+  }
+}
+
 TEST(Pictures, TakeImagesOfAnySize) {
-  for (const int cols : {1, 2, 3, 8, 9, 10, 11, 12, 63, 64, 65}) {
+  for (const int cols : {1, 2, 3, 8, 9, 10, 11, 12, 63, 64, 65, 127, 128, 129}) {
     for (const int rows : {1, 2, 9, 70}) {
       const cv::Mat picture(rows, cols, CV_8UC3, cv::Scalar(1, 2, 3));
       for (const cv::Mat& with : {with_distance_legend(picture, {1, 5}),
                                   with_scalar_legend(picture, 0, 1), with_reason_legend(picture)}) {
-        EXPECT_EQ(with.cols, std::max(cols, 64));
+        EXPECT_EQ(with.cols, std::max(cols, 128));
         EXPECT_TRUE(same_bits(with(cv::Rect({}, picture.size())), picture));
         const cv::Mat sheet = panel_sheet({{"image", picture}, {"legend", with}}, 4);
         EXPECT_GT(sheet.rows, with.rows) << cols << "x" << rows;
