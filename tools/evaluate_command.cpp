@@ -34,8 +34,7 @@ struct EvaluateArguments {
   std::string truth, valid, occlusion, truth_normals, image, field_of_view, calibration;
   std::optional<int> view_of_map, source_of_map;  ///< as given
   int view = 0, source = 1;
-  double png_scale = FolderFormat::usual_png_scale;
-  double truth_png_scale = FolderFormat::usual_png_scale;
+  std::optional<double> png_scale, truth_png_scale;
   double far_distance = 0;  ///< metres, 0: do not score what has no ground truth
   WhiteLevel white_level;
   std::string error_map;
@@ -145,8 +144,8 @@ void take_from_set(EvaluateArguments& a) {
 }
 
 void run_evaluate(EvaluateArguments a) {
-  require_scaled_png("--png-scale", a.png_scale, a.prediction);
-  const cv::Mat prediction = read_map(a.prediction, 1, "a distance map", a.png_scale);
+  const cv::Mat prediction = read_map(a.prediction, 1, "a distance map",
+                                      png_scale_of("--png-scale", a.png_scale, a.prediction));
   choose_views(a, prediction.size());
   if (!a.set.empty()) take_from_set(a);
   if (a.truth.empty() || a.calibration.empty()) {
@@ -158,8 +157,8 @@ void run_evaluate(EvaluateArguments a) {
                         a.truth_normals, a.image, a.field_of_view, a.calibration});
   }
   ws::GroundTruth truth;
-  require_scaled_png("--truth-png-scale", a.truth_png_scale, a.truth);
-  truth.distance = read_map(a.truth, 1, "a distance map", a.truth_png_scale);
+  truth.distance = read_map(a.truth, 1, "a distance map",
+                            png_scale_of("--truth-png-scale", a.truth_png_scale, a.truth));
   if (!a.valid.empty()) truth.valid = read_labels(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
   if (!a.truth_normals.empty()) truth.normals = read_map(a.truth_normals, 3, "a normal map");

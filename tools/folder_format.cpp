@@ -7,8 +7,10 @@
 #include <limits>
 
 #include "option_checks.h"
+#include "result_folder.h"
 #include "text/formatted.h"
 #include "text/lower_case.h"
+#include "text/number.h"
 #include "widestereo/error.h"
 
 namespace ws = widestereo;
@@ -33,15 +35,21 @@ void FolderFormat::add_maps_to(CLI::App& command) {
 }
 
 void add_png_scale_of_input(CLI::App& command, const std::string& option,
-                            const std::string& distances, double& scale) {
-  command.add_option(option, scale, "Units per metre of a 16-bit PNG of " + distances)
-      ->check(positive_number())
-      ->capture_default_str();
+                            const std::string& distances, std::optional<double>& scale) {
+  command
+      .add_option(option, scale,
+                  "Units per metre of a 16-bit PNG of " + distances +
+                      " (default: as the result's record says, or else " +
+                      ws::text_of(FolderFormat::usual_png_scale) + ")")
+      ->check(positive_number());
 }
 
-void require_scaled_png(const std::string& option, double scale, const fs::path& map) {
-  const bool is_png = ws::lower_case(map.extension().string()) == ".png";
-  if (is_png || scale == FolderFormat::usual_png_scale) return;
+double png_scale_of(const std::string& option, std::optional<double> given, const fs::path& map) {
+  if (ws::lower_case(map.extension().string()) == ".png") {
+    if (given) return *given;
+    return recorded_number(map, "/png_scale").value_or(FolderFormat::usual_png_scale);
+  }
+  if (!given) return FolderFormat::usual_png_scale;
   throw ws::Error(option + " has no effect on " + map.string() +
                   ", which is no PNG; leave it out.");
 }

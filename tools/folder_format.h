@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct FolderFormat {
 
 /// Adds the scale of a distance map that is read; `distances`: which, in the option's help.
 void add_png_scale_of_input(CLI::App& command, const std::string& option,
-                            const std::string& distances, double& scale);
-/// Throws Error where it was given for a map that has none.
-void require_scaled_png(const std::string& option, double scale, const std::filesystem::path& map);
+                            const std::string& distances, std::optional<double>& scale);
+/// That of a map: as given, else as the record beside it says, else the usual one. Throws Error
+/// where it was given for a map that has none.
+double png_scale_of(const std::string& option, std::optional<double> given,
+                    const std::filesystem::path& map);

@@ -263,6 +263,7 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
   }
   record["patch_samples"] = run.result.samples;
   record["origin"] = to_json(contents.world_origin);
+  record["png_scale"] = format.png_scale;
   const std::string patch_side = std::to_string(ws::texture_patch_side);
   record["conventions"] = {
       {"unit", contents.in_metres ? "metre" : "that of the reconstruction"},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "commands.h"
@@ -23,7 +24,7 @@ namespace {
 struct SynthesisArguments {
   std::string distance, image, other;
   std::string picture;
-  double png_scale = FolderFormat::usual_png_scale;
+  std::optional<double> png_scale;
   RigSettings rig;
   PoseSettings poses;
   SizeSettings size;
@@ -45,8 +46,8 @@ void run_synthesis(const SynthesisArguments& a) {
       calibrated_images(a.rig, a.poses, {a.image, a.other}, image.size(), a.rig.sfm_model()).rig;
   image = stretched_within_view(image, rig.views[0], a.image);
   other = stretched_within_view(other, rig.views[1], a.other);
-  require_scaled_png("--png-scale", a.png_scale, a.distance);
-  const cv::Mat distance = ws::read_map(a.distance, a.png_scale);
+  const cv::Mat distance =
+      ws::read_map(a.distance, png_scale_of("--png-scale", a.png_scale, a.distance));
   require_values(distance, a.distance, 1, "a distance map");
   image = a.size.reduced(image, rig.views[0], a.image);
   other = a.size.reduced(other, rig.views[1], a.other);

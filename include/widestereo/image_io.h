@@ -53,7 +53,8 @@ cv::Mat read_mask(const std::filesystem::path& path);
 
 /// Reads a float map (CV_32FC1 or CV_32FC3, x y z order) from .tiff, .pfm, .exr (one channel, R G B
 /// or X Y Z) or .png (16 bit, divided by `png_scale`, which is the PNG units per metre,
-/// above 0). Throws Error (missing, truncated, damaged, no such map, no such scale).
+/// above 0). Throws Error (missing, truncated, damaged, no such map, 16 bits in no .png, no such
+/// scale).
 cv::Mat read_map(const std::filesystem::path& path, double png_scale = 1000.0);
 
 /// Writes a CV_32FC1 or CV_32FC3 (x y z) map by extension: .tiff (32-bit float), .pfm, .exr (32-bit

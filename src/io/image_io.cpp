@@ -344,6 +344,11 @@ cv::Mat read_map(const fs::path& path, double png_scale) {
   const cv::Mat image = decode(read_bytes(path), path, "a map",
                                "a 32-bit float TIFF or PFM, OpenEXR, or a 16-bit PNG");
   cv::Mat map;
+  if (image.type() == CV_16UC1 && extension != ".png") {
+    throw Error(path.string() +
+                " has 16 bits, which hold distances by the scale of PNGs alone; convert it to a "
+                "16-bit PNG, or to a 32-bit float TIFF in metres.");
+  }
   if (image.type() == CV_16UC1) {
     image.convertTo(map, CV_32F, 1 / png_scale);
   } else if (image.type() == CV_32FC1 || image.type() == CV_32FC3) {

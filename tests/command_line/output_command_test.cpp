@@ -181,12 +181,23 @@ TEST_F(Output, DistancePngsOfAnyScaleAreRead) {
   };
   EXPECT_LT(median("out/distance0.png --png-scale 500"), 0.01);
   EXPECT_LT(median("out/distance0.tiff --truth-png-scale 500", "out/distance0.png"), 0.01);
-  EXPECT_GT(median("out/distance0.tiff", "out/distance0.png"), 0.3);
-  EXPECT_NEAR(median("out/distance0.png"), 0.5, 0.01);
-  const std::string synthesis = "view-synthesis " + file("out/distance0.png") + " " +
-                                file("left.png") + " " + file("right.png") + " -c " +
-                                file("calib.yaml") + " --json";
-  EXPECT_NE(run(synthesis).output, run(synthesis + " --png-scale 500").output);
+  // The record says the scale.
+  EXPECT_EQ(nlohmann::json::parse(bytes_of("out/result.json"))["png_scale"], 500);
+  EXPECT_LT(median("out/distance0.png"), 0.01);
+  EXPECT_LT(median("out/distance0.tiff", "out/distance0.png"), 0.01);
+  EXPECT_NEAR(median("out/distance0.png --png-scale 1000"), 0.5, 0.01) << "as given";
+  fs::copy_file(file("out/distance0.png"), file("moved.png"));
+  EXPECT_GT(median("out/distance0.tiff", "moved.png"), 0.3);
+  EXPECT_NEAR(median("moved.png"), 0.5, 0.01);
+  fs::copy_file(file("out/distance0.png"), file("out/other.png"));
+  EXPECT_NEAR(median("out/other.png"), 0.5, 0.01) << "is not of the record";
+  const auto synthesis = [this](const std::string& distance) {
+    return run("view-synthesis " + file(distance) + " " + file("left.png") + " " +
+               file("right.png") + " -c " + file("calib.yaml") + " --json")
+        .output;
+  };
+  EXPECT_NE(synthesis("moved.png"), synthesis("moved.png --png-scale 500"));
+  EXPECT_EQ(synthesis("out/distance0.png"), synthesis("moved.png --png-scale 500"));
 }
 
 TEST_F(Output, FilesOfOthersAreNotReplaced) {

@@ -123,6 +123,12 @@ TEST(Maps, UnsupportedOnesAreRefused) {
   EXPECT_THROW(write_map(folder / "a.jpg", random_map(CV_32FC1)), Error);
   EXPECT_THROW(write_map(folder / "a.png", random_map(CV_32FC3)), Error);
   EXPECT_THROW(write_map(folder / "a.tiff", random_map(CV_64FC1)), Error);
+  for (const char* name : {"deep.tiff", "deep.pgm"}) {
+    cv::imwrite((folder / name).string(), cv::Mat(2, 2, CV_16UC1, cv::Scalar(1500)));
+    EXPECT_NE(error_of([&] { read_map(folder / name, 1000); }).find("the scale of PNGs alone"),
+              std::string::npos)
+        << name;
+  }
   folder.write("text.tiff", "no map");
   EXPECT_NE(error_of([&] { read_map(folder / "text.tiff"); }).find("is not a map that can be read"),
             std::string::npos);
