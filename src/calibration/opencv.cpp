@@ -328,18 +328,51 @@ Camera read_camera(const Document& document, const Storage& storage, const Camer
   return camera;
 }
 
+/// How large images are, compared to the given ones, of whose sides all principal points are the
+/// middle; none where they tell different sizes.
+std::optional<double> share_by_centres(const Rig& rig) {
+  constexpr double tolerance = 0.04;
+  std::vector<double> shares;
+  for (const View& view : rig.views) {
+    const Camera& c = view.camera;
+    shares.push_back((c.cx + 0.5) / (c.width / 2.0));
+    shares.push_back((c.cy + 0.5) / (c.height / 2.0));
+  }
+  const auto [least, most] = std::ranges::minmax(shares);
+  const double share = (least + most) / 2;
+  if (!(share > 0 && most - share <= tolerance * share)) return std::nullopt;
+  return share;
+}
+
 /// A file without a size may be for images of another one.
-void require_centre(const Document& document, const View& view) {
-  constexpr double least = 0.3;  // of the side; for images of half or twice the size 0.25 or 1
-  const Camera& c = view.camera;
+void require_centres(const Document& document, const Rig& rig) {
+  constexpr double same = 0.1;
+  constexpr double least = 0.42;  // of the side
+  const char* const remedy =
+      "add image_width and image_height, those of the images it was made with";
+  const Camera& first = rig.views[0].camera;
+  const double share = share_by_centres(rig).value_or(1);
+  const std::optional<int> width = whole_number(std::round(share * first.width));
+  const std::optional<int> height = whole_number(std::round(share * first.height));
+  if (std::abs(share - 1) > same && width && height) {
+    document.fail(
+        "It has no image size, and by its principal points it was likely made for images of "
+        "about " +
+            size_text(*width, *height) + " pixels, while the given ones have " +
+            size_text(first.width, first.height),
+        std::string(remedy) + ", and `calibration convert --scale` then makes one for the given");
+  }
   const auto is_near_middle = [](double centre, int side) {
     return centre > least * side && centre < (1 - least) * side;
   };
-  if (is_near_middle(c.cx, c.width) && is_near_middle(c.cy, c.height)) return;
-  document.fail("It has no image size, and the principal point of " + view.name +
-                    " is not near the middle of the given images of " +
-                    size_text(c.width, c.height) + " pixels",
-                "add image_width and image_height, those of the images it was made with");
+  for (const View& view : rig.views) {
+    const Camera& c = view.camera;
+    if (is_near_middle(c.cx, c.width) && is_near_middle(c.cy, c.height)) continue;
+    document.fail("It has no image size, and the principal point of " + view.name +
+                      " is not near the middle of the given images of " +
+                      size_text(c.width, c.height) + " pixels",
+                  remedy);
+  }
 }
 
 /// A key of ours, one number for each camera.
@@ -432,7 +465,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         document.fail("It has the second camera's xi without its matrix (K2)", "add it");
       }
       rig.views.pop_back();
-      if (in_file.empty()) require_centre(document, rig.views[0]);
+      if (in_file.empty()) require_centres(document, rig);
       limit_fields_of_view(rig, document, storage);
       return rig;
     }
@@ -442,9 +475,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
         (rig.views[1].camera.model == CameraModel::mei)) {
       document.fail("It has a xi of one camera alone", "add the other's (xi1, xi2), or remove it");
     }
-    if (in_file.empty()) {
-      for (const View& view : rig.views) require_centre(document, view);
-    }
+    if (in_file.empty()) require_centres(document, rig);
     rig.views[1].world_from_camera = second_from_first(storage, document).inverse();
     limit_fields_of_view(rig, document, storage);
     return rig;

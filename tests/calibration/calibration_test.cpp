@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "widestereo/calibration.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -32,6 +33,7 @@ namespace {
 using test::bytes_of;
 using test::replaced;
 using test::TemporaryFolder;
+using ::testing::HasSubstr;
 
 const char* const kalibr_text = R"(cam0:
   camera_model: pinhole
@@ -392,12 +394,27 @@ TEST(OpenCv, TakesTheSizeFromTheImages) {
   EXPECT_NE(error_of(path).find("image size"), std::string::npos);
   EXPECT_EQ(read_calibration(path, {1280, 960}).rig.views[1].camera.height, 960);
   EXPECT_THROW(read_calibration(folder.write("with.yml", opencv_text), {640, 480}), Error);
-  for (const cv::Size of_another_scale : {cv::Size(640, 480), cv::Size(2560, 1920)}) {
-    EXPECT_NE(test::error_of([&] {
-                read_calibration(path, of_another_scale);
-              }).find("not near the middle of the given images"),
-              std::string::npos);
+  const auto error_for = [&](int width, int height) {
+    return test::error_of([&] { read_calibration(path, {width, height}); });
+  };
+  // By its centres, which lie within 3 % of the middle, for 1279x959.
+  for (const double scale : {0.5, 2 / 3., 0.8, 1.25, 1.5, 2.0}) {
+    EXPECT_THAT(error_for(cvRound(1280 * scale), cvRound(960 * scale)),
+                ::testing::MatchesRegex(".*likely made for images of about 12[78].x9[56]. pixels, "
+                                        "while the given ones have .*--scale.*"))
+        << scale;
   }
+  for (const double scale : {0.95, 1.05}) {
+    EXPECT_EQ(error_for(cvRound(1280 * scale), cvRound(960 * scale)), "") << scale;
+  }
+  // Sides of other proportions tell no size.
+  EXPECT_THAT(error_for(1280, 720), HasSubstr("not near the middle of the given images"));
+  EXPECT_THAT(error_for(1600, 960), HasSubstr("not near the middle of the given images"));
+  const std::string of_one = text.substr(0, text.find("K2:"));
+  EXPECT_THAT(test::error_of([&] {
+                read_calibration(folder.write("mono.yml", of_one), {640, 480});
+              }),
+              HasSubstr("likely made for images of about 12"));
 }
 
 TEST(OpenCv, MayCountCamerasFromZero) {
