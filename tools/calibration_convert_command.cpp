@@ -40,7 +40,7 @@ void add_calibration_convert_command(CLI::App& group) {
   command
       ->add_option("--scale", arguments->scale,
                    "For images reduced (by averaging) by exactly this factor, as 0.5 of binned "
-                   "ones; the size is rounded")
+                   "ones, or 2 where those calibrated were binned; the size is rounded")
       ->check(positive_number())
       ->capture_default_str();
   command->callback([arguments] { convert(*arguments); });

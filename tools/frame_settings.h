@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "widestereo/error.h"
 #include "widestereo/sequence.h"
 
 struct ChosenFrames {
@@ -17,6 +18,17 @@ struct ChosenFrames {
 /// Says how many of these frames are left out and `why` ("as ...").
 void report_left_out(std::size_t left_out, std::size_t frames, const std::string& why,
                      const std::string& first);
+
+/// What `read` makes of a file among many that can do without it: its errors say how.
+template <class Read>
+auto read_of_many(const Read& read) {
+  try {
+    return read();
+  } catch (const widestereo::Error& error) {
+    throw widestereo::Error(
+        error.what() + std::string(" Or remove it, and give --skip-incomplete to do without it."));
+  }
+}
 
 struct FrameSettings {
   /// What a data set is.

@@ -249,8 +249,10 @@ class SequenceRun {
   };
 
   std::vector<cv::Mat> images_of(const ws::SequenceFrame& frame) const {
-    return reduced(read_images(frame, arguments_.white_level), frame, selection_.calibrated,
-                   arguments_.size);
+    const std::vector<cv::Mat> images = read_images(frame, arguments_.white_level);
+    // An image of another size is the odd one out, as the first frame has been read before.
+    return read_of_many(
+        [&] { return reduced(images, frame, selection_.calibrated, arguments_.size); });
   }
 
   void take_up(std::size_t last) {

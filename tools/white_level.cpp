@@ -3,8 +3,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "frame_settings.h"
 #include "say.h"
-#include "widestereo/error.h"
 #include "widestereo/image_io.h"
 
 namespace ws = widestereo;
@@ -36,10 +36,5 @@ cv::Mat WhiteLevel::read(const std::filesystem::path& file, int otherwise) const
 }
 
 cv::Mat WhiteLevel::read_of_many(const std::filesystem::path& file) const {
-  try {
-    return read(file);
-  } catch (const ws::Error& error) {
-    throw ws::Error(error.what() +
-                    std::string(" Or remove it, and give --skip-incomplete to do without it."));
-  }
+  return ::read_of_many([&] { return read(file); });
 }

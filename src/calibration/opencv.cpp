@@ -20,6 +20,7 @@
 #include "calibration/camera_forms.h"
 #include "calibration/formats.h"
 #include "geometry/angle.h"
+#include "geometry/validation.h"
 #include "text/size_text.h"
 
 namespace widestereo::calibration {
@@ -447,7 +448,7 @@ Rig read_opencv(const Document& document, cv::Size image_size) {
       document.fail("It is for images of " + size_text(in_file.width, in_file.height) +
                         " pixels, the given ones have " +
                         size_text(image_size.width, image_size.height),
-                    "`calibration convert --scale` makes a calibration for reduced images");
+                    remedy_of_size(image_size, in_file));
     }
     require_known_xi(document, storage);
     if (!storage.matrix(third_matrix).empty()) {

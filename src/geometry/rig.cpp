@@ -42,19 +42,11 @@ bool is_masked(const View& view, const Eigen::Vector2d& position) {
 void require_calibrated_size(const cv::Mat& map, const View& view, const std::string& name) {
   require_pixels(map, name);
   require_two_dimensions(map, name);
-  const Camera& camera = view.camera;
-  if (map.cols == camera.width && map.rows == camera.height) return;
-  // To within half a pixel of either side, and by more than a crop of a few pixels.
-  const double share = static_cast<double>(map.cols) / camera.width;
-  const bool is_reduced =
-      share < 0.95 && std::abs(map.rows - share * camera.height) <= 0.5 + 0.5 * share;
+  const cv::Size calibrated(view.camera.width, view.camera.height);
+  if (map.size() == calibrated) return;
   throw Error(name + " is " + size_text(map.cols, map.rows) + " pixels, but the calibration of " +
-              view.name + " is for " + size_text(camera.width, camera.height) +
-              "; both must have the same size" +
-              (is_reduced
-                   ? "; `calibration convert --scale` makes a calibration for reduced images, but "
-                     "not of a COLMAP model, which needs the original ones (and --max-image-size)."
-                   : "."));
+              view.name + " is for " + size_text(calibrated.width, calibrated.height) + "; " +
+              remedy_of_size(map.size(), calibrated) + ".");
 }
 
 void require_mask_size(const cv::Mat& mask, const View& view, const std::string& name) {

@@ -168,6 +168,37 @@ void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std
   if (!map.empty()) require_map(map, size, type, name);
 }
 
+std::string remedy_of_size(cv::Size given, cv::Size calibrated) {
+  const std::string same = "both must have the same size";
+  if (given == cv::Size(calibrated.height, calibrated.width)) {
+    return same + "; where images are turned by 90 degrees, turn them back";
+  }
+  // To within half a pixel of either side, and by more than a crop of a few pixels.
+  const double share = static_cast<double>(given.width) / calibrated.width;
+  const bool is_scaled = std::abs(given.height - share * calibrated.height) <= 0.5 + 0.5 * share;
+  if (is_scaled && share < 0.95) {
+    return same +
+           "; `calibration convert --scale` makes a calibration for reduced images, but not of a "
+           "COLMAP model, which needs the original ones (and --max-image-size)";
+  }
+  if (is_scaled && share > 1.05) {
+    const bool is_multiple = given == calibrated * cvRound(share);
+    return same +
+           "; reduce images to that calibrated, or make a calibration for larger ones by "
+           "`calibration convert --scale" +
+           (is_multiple ? " " + text_of(cvRound(share)) : "") + "`";
+  }
+  if (given.width <= calibrated.width && given.height <= calibrated.height) {
+    return same +
+           "; where images are cropped, subtract what is missing on their left and top from cx and "
+           "cy, and set the calibration's size to theirs";
+  }
+  if (given.width >= calibrated.width && given.height >= calibrated.height) {
+    return same + "; where those calibrated were cropped, crop these likewise";
+  }
+  return same;
+}
+
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name) {
   if (mask.empty()) return;
   require_type(mask, CV_8UC1, name + ": the mask");

@@ -49,6 +49,10 @@ void require_map(const cv::Mat& map, cv::Size size, int type, const std::string&
 /// Both, of a map that may be empty.
 void require_optional_map(const cv::Mat& map, cv::Size size, int type, const std::string& name);
 
+/// What to do about an image of another size than that calibrated, for the end of a message: a
+/// clause.
+std::string remedy_of_size(cv::Size given, cv::Size calibrated);
+
 /// Throws Error unless `mask` is empty or CV_8UC1 of the camera's size. `name` begins the message.
 void require_fitting_mask(const cv::Mat& mask, const Camera& camera, const std::string& name);
 

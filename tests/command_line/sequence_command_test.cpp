@@ -480,6 +480,23 @@ TEST_F(SequenceCommand, ADamagedImageIsDoneWithoutOnceItIsRemoved) {
   EXPECT_EQ(record()["frames"][1]["name"], "002");
 }
 
+TEST_F(SequenceCommand, AnImageOfAnotherSizeIsDoneWithoutOnceItIsRemoved) {
+  const std::string odd = file("data/cam1/001.png");
+  cv::Mat noise(48, 96, CV_8UC1);
+  cv::randu(noise, 0, 255);
+  cv::imwrite(odd, noise);
+  const Outcome failed = run(sequence());
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_NE(failed.output.find(odd + " is 96x48 pixels"), std::string::npos) << failed.output;
+  EXPECT_NE(failed.output.find("Or remove it, and give --skip-incomplete"), std::string::npos)
+      << failed.output;
+  // Where the first frame has another size, all may have.
+  cv::imwrite(file("data/cam1/000.png"), noise);
+  const Outcome first = run(sequence("other"));
+  EXPECT_NE(first.output.find("000.png is 96x48 pixels"), std::string::npos) << first.output;
+  EXPECT_EQ(first.output.find("Or remove it"), std::string::npos) << first.output;
+}
+
 TEST_F(SequenceCommand, ReadsEurocLayoutWithPoses) {
   std::string poses = "# seconds, of the frames that are chosen\n";
   for (int camera = 0; camera < 2; ++camera) {

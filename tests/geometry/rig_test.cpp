@@ -117,16 +117,32 @@ TEST(Maps, HaveTheCalibratedSize) {
         [&] { require_calibrated_size(cv::Mat(height, width, CV_8UC1), view, "map.tiff"); });
   };
   EXPECT_EQ(error(64, 48), "");
-  for (const auto& [width, height] : {std::pair(48, 64), {63, 48}, {64, 49}}) {
+  const auto expect = [&](int width, int height, const std::string& remedy) {
     EXPECT_EQ(error(width, height),
               "map.tiff is " + std::to_string(width) + "x" + std::to_string(height) +
                   " pixels, but the calibration of cam1 is for 64x48; both must have the same "
-                  "size.");
-  }
-  EXPECT_NE(error(32, 24).find("the same size; `calibration convert --scale` makes a calibration "
-                               "for reduced images"),
-            std::string::npos)
-      << error(32, 24);
+                  "size" +
+                  remedy + ".");
+  };
+  expect(48, 64, "; where images are turned by 90 degrees, turn them back");
+  const std::string cropped =
+      "; where images are cropped, subtract what is missing on their left and top from cx and cy, "
+      "and set the calibration's size to theirs";
+  expect(63, 48, cropped);
+  expect(64, 36, cropped);
+  expect(40, 40, cropped);
+  expect(64, 49, "; where those calibrated were cropped, crop these likewise");
+  expect(63, 49, "");
+  const std::string reduced =
+      "; `calibration convert --scale` makes a calibration for reduced images, but not of a COLMAP "
+      "model, which needs the original ones (and --max-image-size)";
+  expect(32, 24, reduced);
+  expect(53, 40, reduced);
+  const std::string enlarged =
+      "; reduce images to that calibrated, or make a calibration for larger ones by `calibration "
+      "convert --scale";
+  expect(128, 96, enlarged + " 2`");
+  expect(96, 72, enlarged + "`");
 }
 
 TEST(Masks, ExcludeTheNearestPixelAndWhatIsOutside) {
