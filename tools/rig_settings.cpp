@@ -23,10 +23,41 @@ cv::Mat field_of_view(const ws::Camera& camera, const cv::Mat& mask) {
   return usable != 0;
 }
 
-/// One of the files of a rig in formats that have one for each camera.
-bool is_of_one_camera(const ws::Calibration& calibration) {
-  return calibration.files.size() == 1 && (calibration.format == ws::CalibrationFormat::euroc ||
-                                           calibration.format == ws::CalibrationFormat::ros);
+/// How a calibration that has one camera becomes one of the rig.
+const char* way_to_rig(ws::CalibrationFormat format) {
+  using enum ws::CalibrationFormat;
+  switch (format) {
+    case camodocal:
+      return "Name the cameras' files in one of VINS-Fusion (cam0_calib, cam1_calib, body_T_cam0, "
+             "body_T_cam1)";
+    case ocam:
+      return "Put the cameras into a config.yaml of OmniMVS, with their poses";
+    case multicol:
+      return "Give the MultiCamSys_Calibration.yaml of the rig";
+    case woodscape:
+      return "No rig that can be read has cameras of WoodScape: calibrate with another model";
+    case orb_slam:
+      return "Put the cameras into one file, as Camera1 and Camera2 with Stereo.T_c1_c2";
+    case opencv:
+      return "Put the cameras into one file, as K1, D1, K2, D2, R and T";
+    default:
+      return "Put the cameras into one Kalibr camchain, cam1 with T_cn_cnm1";
+  }
+}
+
+/// What to do where images are of more cameras than these.
+std::string remedy_of_cameras(const ws::Calibration& calibration) {
+  if (calibration.rig.views.size() > 1) {
+    return "Give one image for each camera, choose cameras with --views, or give the --poses of a "
+           "camera that moved.";
+  }
+  // These have one file for each camera.
+  if (calibration.files.size() == 1 && (calibration.format == ws::CalibrationFormat::euroc ||
+                                        calibration.format == ws::CalibrationFormat::ros)) {
+    return "Give the folder that has the files of all cameras.";
+  }
+  return std::string(way_to_rig(calibration.format)) +
+         ", or give the --poses of a camera that moved.";
 }
 
 /// Whether a mask leaves out most of what lies farther off the axis, so that it knows the rim: one
@@ -84,10 +115,7 @@ ws::Rig RigSettings::rig_for_images(std::size_t image_count, cv::Size size) cons
     if (view < 0 || view >= static_cast<int>(all.views.size())) {
       throw ws::Error(calibration + " has " + std::to_string(all.views.size()) +
                       " camera(s); there is no camera " + std::to_string(view) + ". " +
-                      (is_of_one_camera(read)
-                           ? "Give the folder that has the files of all cameras."
-                           : "Give one image for each camera, choose cameras with --views, or give "
-                             "the --poses of a camera that moved."));
+                      remedy_of_cameras(read));
     }
     rig.views.push_back(all.views[static_cast<std::size_t>(view)]);
   }

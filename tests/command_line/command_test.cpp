@@ -648,6 +648,49 @@ TEST_F(Command, ACameraThatIsMissingMayBeInTheFolder) {
   expect_error(pair + file("calib.yaml") + " --views 0,2", "there is no camera 2. Give one image");
 }
 
+TEST_F(Command, ACameraThatIsMissingGoesIntoAFileOfTheRig) {
+  const auto expect = [&](const std::string& name, const std::string& remedy) {
+    expect_error("depth " + file("left.png") + " " + file("right.png") + " -o " + file("out") +
+                     " -c " + file(name),
+                 " has 1 camera(s); there is no camera 1. " + remedy);
+  };
+  write_first_camera();
+  expect("mono.yaml", "Put the cameras into one Kalibr camchain, cam1 with T_cn_cnm1, or give the");
+  folder_.write("camodocal.yaml", R"(%YAML:1.0
+---
+model_type: MEI
+image_width: 96
+image_height: 96
+mirror_parameters: { xi: 2.2 }
+distortion_parameters: { k1: 0.01, k2: 0, p1: 0, p2: 0 }
+projection_parameters: { gamma1: 133, gamma2: 133, u0: 47, v0: 48 }
+)");
+  expect("camodocal.yaml", "Name the cameras' files in one of VINS-Fusion (cam0_calib, cam1_calib");
+  folder_.write("orb.yaml", R"(%YAML:1.0
+Camera.type: "KannalaBrandt8"
+Camera1.fx: 30
+Camera1.fy: 30
+Camera1.cx: 47
+Camera1.cy: 48
+Camera1.k1: 0
+Camera1.k2: 0
+Camera1.k3: 0
+Camera1.k4: 0
+Camera.width: 96
+Camera.height: 96
+)");
+  expect("orb.yaml", "Put the cameras into one file, as Camera1 and Camera2 with Stereo.T_c1_c2");
+  folder_.write("woodscape.json",
+                "{\"intrinsic\": {\"model\": \"radial_poly\", \"width\": 96, \"height\": 96, "
+                "\"cx_offset\": 0, \"cy_offset\": 0, \"aspect_ratio\": 1, \"k1\": 30, \"k2\": 0, "
+                "\"k3\": 0, \"k4\": 0}}");
+  expect("woodscape.json", "No rig that can be read has cameras of WoodScape");
+  folder_.write("opencv.yaml",
+                "image_width: 96\nimage_height: 96\nK: [30, 0, 48, 0, 30, 48, 0, 0, 1]\n"
+                "D: [0, 0, 0, 0]\n");
+  expect("opencv.yaml", "Put the cameras into one file, as K1, D1, K2, D2, R and T");
+}
+
 TEST_F(Command, UnknownWordsAreNamed) {
   const auto expect = [](const std::string& arguments, const std::string& message) {
     const Outcome outcome = run(arguments);
