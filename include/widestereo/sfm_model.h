@@ -34,7 +34,8 @@ bool is_sfm_model(const std::filesystem::path& path);
 /// numbered in the order of their names.
 class SfmModel {
  public:
-  /// Reads the whole model. Throws Error naming the file and the remedy.
+  /// Reads the whole model. Cameras of a transforms.json without a size have that of their first
+  /// image. Throws Error naming the file and the remedy.
   explicit SfmModel(const std::filesystem::path& path);
   ~SfmModel();
   SfmModel(SfmModel&&) noexcept;

@@ -4,11 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "calibration/document.h"
+#include "text/file_type.h"
 #include "text/text_input.h"
+#include "widestereo/image_io.h"
 
 namespace widestereo::calibration {
 namespace {
@@ -132,7 +136,7 @@ class Reader {
                       [&frame](const auto& key) { return frame.contains(key.first); });
       image.camera = has_own ? i + 1 : 0;
       if (!transforms.cameras.contains(image.camera)) {
-        transforms.cameras.emplace(image.camera, camera_of(frame, i));
+        transforms.cameras.emplace(image.camera, camera_of(frame, i, image.name));
       }
       transforms.images.push_back(std::move(image));
     }
@@ -155,9 +159,9 @@ class Reader {
 
   double number(const Json& frame, std::size_t i, const char* key) const {
     const Json* value = find(frame, key);
-    if (value == nullptr || !value->is_number()) {
-      fail(i, "The number \"" + std::string(key) + "\" is missing", "add it");
-    }
+    const std::string name = "\"" + std::string(key) + "\"";
+    if (value == nullptr) fail(i, "The number " + name + " is missing", "add it");
+    if (!value->is_number()) fail(i, name + " is no number", "write it without quotes or brackets");
     return value->get<double>();
   }
 
@@ -229,7 +233,24 @@ class Reader {
     return parameters;
   }
 
-  ColmapCamera camera_of(const Json& frame, std::size_t i) const {
+  /// Width and height in pixels; NeRF's data sets leave them to the image.
+  std::pair<double, double> size_of(const Json& frame, std::size_t i,
+                                    const std::string& image) const {
+    if (has(frame, "w") || has(frame, "h")) return {number(frame, i, "w"), number(frame, i, "h")};
+    const fs::path file = document_.path.parent_path() / image;
+    if (type_of(file) == fs::file_type::not_found) {
+      fail(i,
+           "\"w\" and \"h\", the width and height of the images in pixels, are missing, and there "
+           "is no " +
+               file.string() + ", which would tell them",
+           "add them");
+    }
+    const cv::Size size = read_image(file).size();
+    return {size.width, size.height};
+  }
+
+  /// Of the frame that the image of this path is of.
+  ColmapCamera camera_of(const Json& frame, std::size_t i, const std::string& image) const {
     const std::string name = model_name(frame, i);
     const ColmapModel* model = find_model(name);
     const auto has_key = [](double Camera::*member) {
@@ -244,8 +265,7 @@ class Reader {
     }
     ColmapCamera camera;
     camera.model = model;
-    camera.width = number(frame, i, "w");
-    camera.height = number(frame, i, "h");
+    std::tie(camera.width, camera.height) = size_of(frame, i, image);
     if (model->equivalent == CameraModel::equirectangular) {
       // Whatever focal lengths writers invent for a whole sphere.
       camera.parameters = {camera.width, camera.height};

@@ -81,6 +81,34 @@ TEST_F(Nerfstudio, InstantNgpsWordsAreKnown) {
   EXPECT_EQ(error(file(pinhole + R"("latlong": false)", frame("a.png"))), "");
 }
 
+/// Its data sets have neither width nor height.
+TEST_F(Nerfstudio, NerfsSizesAreThoseOfTheImages) {
+  const std::string angle = R"("camera_angle_x": 1.5707963267948966)";
+  const std::string text = file(angle, frame("./train/r_0") + ", " + frame("./train/r_1"));
+  const std::string missing = error(text);
+  EXPECT_NE(missing.find("Frame 0: \"w\" and \"h\", the width and height of the images in pixels, "
+                         "are missing"),
+            std::string::npos)
+      << missing;
+  EXPECT_NE(missing.find("train/r_0.png"), std::string::npos) << missing;
+  std::filesystem::create_directory(folder_ / "train");
+  write_image(folder_ / "train/r_0.png", cv::Mat(80, 100, CV_8UC1, cv::Scalar(7)));
+  const View seen = view(text, 1);
+  EXPECT_EQ(seen.camera.width, 100);
+  EXPECT_EQ(seen.camera.height, 80);
+  EXPECT_NEAR(seen.camera.fx, 50, 1e-9);
+  EXPECT_EQ(seen.camera.cx, 49.5);
+  EXPECT_NE(error(file(angle + R"(, "w": 100)", frame("./train/r_0"))).find("\"h\" is missing"),
+            std::string::npos);
+}
+
+TEST_F(Nerfstudio, WhatIsNoNumberIsNotMissing) {
+  const std::string message =
+      error(file(R"("camera_angle_x": 1.5, "w": 100, "h": "80")", frame("a.png")));
+  EXPECT_NE(message.find("Frame 0: \"h\" is no number; write it without quotes"), std::string::npos)
+      << message;
+}
+
 // As exported from Project Aria's recordings.
 TEST_F(Nerfstudio, CoefficientsMayBeListed) {
   const std::string aria = R"("camera_model": "FISHEYE624", "w": 96, "h": 80)";
