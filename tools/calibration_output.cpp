@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "text/lower_case.h"
 #include "widestereo/calibration.h"
 #include "widestereo/files.h"
 
@@ -20,7 +21,8 @@ void CalibrationOutput::add_format_to(CLI::App& command) {
   command
       .add_option(
           "--to", format,
-          "kalibr, basalt or opencv; by default basalt where the file ends in .json, else kalibr")
+          "kalibr, basalt or opencv; by default basalt where the file ends in .json, opencv where "
+          "it ends in .xml, else kalibr")
       ->check(CLI::IsMember({kalibr, basalt, opencv}));
 }
 
@@ -29,8 +31,9 @@ void CalibrationOutput::require_form(const ws::Rig& rig) const { (void)text(rig)
 void CalibrationOutput::write(const ws::Rig& rig) const { ws::write_text(file, text(rig)); }
 
 std::string CalibrationOutput::text(const ws::Rig& rig) const {
-  const bool ends_in_json = std::filesystem::path(file).extension() == ".json";
-  const std::string used = !format.empty() ? format : ends_in_json ? basalt : kalibr;
+  const std::string extension = ws::lower_case(std::filesystem::path(file).extension().string());
+  const std::string of_file = extension == ".json" ? basalt : extension == ".xml" ? opencv : kalibr;
+  const std::string& used = format.empty() ? of_file : format;
   if (used == opencv) return ws::opencv_text(file, rig);
   return used == kalibr ? ws::kalibr_text(file, rig) : ws::basalt_text(file, rig);
 }

@@ -13,6 +13,7 @@
 #include "option_checks.h"
 #include "progress_bar.h"
 #include "say.h"
+#include "text/lower_case.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
@@ -59,6 +60,12 @@ void PosedImageSettings::add_to(CLI::App& command) {
 
 PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
   PosedImages posed = ws::is_sfm_model(rig.calibration) ? of_model() : of_trajectory();
+  // Before images are read, as the range may be missing.
+  std::optional<ws::Options> without_points;
+  if (posed.selection == nullptr) {
+    const ws::CalibratedImages images_alone{.rig = {}, .in_metres = posed.in_metres};
+    without_points = with_range(settings, images_alone, rig.calibration).options();
+  }
   const std::vector<bool> masked = apply_masks(posed);
   posed.size = size;
   posed.white_level = white_level;
@@ -71,13 +78,11 @@ PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
     reduced.mask = mask;
   }
   leave_out_dark_rims(posed, masked);
-  if (posed.selection == nullptr) {
-    const ws::CalibratedImages without_points{.rig = {}, .in_metres = posed.in_metres};
-    const ws::Options options = with_range(settings, without_points, rig.calibration).options();
+  if (without_points) {
     ProgressBar bar("Looking for images that see the same");
     posed.selection = std::make_shared<const ws::ViewSelection>(
         centres_of(posed.views),
-        ws::assumed_points(posed.views, options.min_distance, options.max_distance,
+        ws::assumed_points(posed.views, without_points->min_distance, without_points->max_distance,
                            [&bar](double share) { bar.show(share); }));
   }
   return posed;
@@ -144,7 +149,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
     // Of a model that is missing, lacks a file or is damaged, reading says so.
     const fs::path calibration = rig.calibration;
     if (!fs::exists(calibration) || fs::is_directory(calibration) ||
-        calibration.extension() == ".json") {
+        ws::lower_case(calibration.extension().string()) == ".json") {
       ws::read_calibration(calibration);
     }
     throw ws::Error(rig.calibration +

@@ -11,6 +11,7 @@
 
 #include "calibration/document.h"
 #include "text/file_type.h"
+#include "text/lower_case.h"
 #include "text/text_input.h"
 #include "widestereo/image_io.h"
 
@@ -335,7 +336,8 @@ class Reader {
 
 bool is_transforms_file(const fs::path& path) {
   std::error_code ignored;
-  if (path.extension() != ".json" || !fs::is_regular_file(path, ignored)) return false;
+  const std::string extension = lower_case(path.extension().string());
+  if (extension != ".json" || !fs::is_regular_file(path, ignored)) return false;
   FrameFinder frames;
   Json::sax_parse(TextInput(path).rest(), &frames);
   return frames.found();

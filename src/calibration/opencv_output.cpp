@@ -12,6 +12,7 @@
 #include "calibration/formats.h"
 #include "geometry/angle.h"
 #include "geometry/validation.h"
+#include "text/lower_case.h"
 #include "widestereo/error.h"
 #include "widestereo/files.h"
 
@@ -95,8 +96,9 @@ void require_form(const Rig& rig, const std::vector<OpenCvForm>& forms,
 }
 
 int language_of(const std::filesystem::path& path) {
-  if (path.extension() == ".xml") return cv::FileStorage::FORMAT_XML;
-  return path.extension() == ".json" ? cv::FileStorage::FORMAT_JSON : cv::FileStorage::FORMAT_YAML;
+  const std::string extension = lower_case(path.extension().string());
+  if (extension == ".xml") return cv::FileStorage::FORMAT_XML;
+  return extension == ".json" ? cv::FileStorage::FORMAT_JSON : cv::FileStorage::FORMAT_YAML;
 }
 
 cv::Mat column(const std::vector<double>& numbers) { return cv::Mat(numbers, true); }

@@ -44,6 +44,15 @@ void require_no_part_of_a_model(const std::filesystem::path& folder) {
               ".txt is missing; give the folder that has cameras and images.");
 }
 
+/// A model in a folder, where structure from motion usually puts it; empty where there is none.
+std::filesystem::path model_in(const std::filesystem::path& folder) {
+  for (const char* place :
+       {"transforms.json", "transforms_train.json", "0", "sparse", "sparse/0", "colmap/sparse/0"}) {
+    if (is_sfm_model(folder / place)) return folder / place;
+  }
+  return {};
+}
+
 bool is_too_large(const std::filesystem::path& file) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(file, error);
@@ -75,10 +84,12 @@ Document load(const std::filesystem::path& path) {
     }
   }
   if (!is_file) {
+    const std::filesystem::path model = model_in(path);
     throw Error(path.string() +
                 " is not a file; give a calibration file, a folder with cam0/sensor.yaml or ROS's "
                 "camera_info files or, for images that it has, a COLMAP model, the folder that "
-                "holds cameras.bin or .txt.");
+                "holds cameras.bin or .txt" +
+                (model.empty() ? "." : "; this one holds " + model.string() + "."));
   }
   return {path, TextInput(path).rest()};
 }

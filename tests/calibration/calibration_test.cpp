@@ -967,6 +967,10 @@ TEST(Writing, OpenCvFilesAreThoseOfItsCalibrations) {
     }
     EXPECT_EQ(static_cast<int>(file["image_width"]), 1280);
   }
+  for (const auto& [name, begin] : {std::pair("AGAIN.XML", "<?xml"), {"AGAIN.JSON", "{"}}) {
+    write_opencv(folder / name, rig);
+    EXPECT_THAT(bytes_of(folder / name), ::testing::StartsWith(begin));
+  }
   Rig one = rig;
   one.views.pop_back();
   write_opencv(folder / "one.yml", one);
@@ -1323,6 +1327,20 @@ TEST(BadCalibration, WhatAColmapModelLacksIsNamed) {
   folder.write("cameras.txt", "");
   const std::string error = error_of(folder.path());
   EXPECT_NE(error.find("images.bin or images.txt is missing"), std::string::npos) << error;
+}
+
+TEST(BadCalibration, ModelsInAFolderAreNamed) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(error_of(folder.path()), HasSubstr("holds cameras.bin or .txt."));
+  std::filesystem::create_directories(folder / "sparse/0");
+  for (const char* name : {"cameras.txt", "images.txt"}) {
+    folder.write("sparse/0/" + std::string(name), "");
+  }
+  const std::string named = "; this one holds " + (folder / "sparse/0").string() + ".";
+  EXPECT_THAT(error_of(folder.path()), HasSubstr(named));
+  EXPECT_THAT(error_of(folder / "sparse"), HasSubstr(named));
+  const auto file = folder.write("transforms.json", R"({"frames": []})");
+  EXPECT_THAT(error_of(folder.path()), HasSubstr("; this one holds " + file.string() + "."));
 }
 
 /// Whatever bytes come, the reader answers with a rig or an Error.

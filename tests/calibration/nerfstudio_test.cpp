@@ -102,6 +102,12 @@ TEST_F(Nerfstudio, NerfsSizesAreThoseOfTheImages) {
             std::string::npos);
 }
 
+TEST_F(Nerfstudio, FilesMayEndInCapitals) {
+  const std::string text = file(fisheye, frame("a.png"));
+  EXPECT_TRUE(is_sfm_model(folder_.write("T.JSON", text)));
+  EXPECT_FALSE(is_sfm_model(folder_.write("t.yaml", text)));
+}
+
 TEST_F(Nerfstudio, WhatIsNoNumberIsNotMissing) {
   const std::string message =
       error(file(R"("camera_angle_x": 1.5, "w": 100, "h": "80")", frame("a.png")));

@@ -610,6 +610,9 @@ TEST_F(TransformsCommand, AMaskOfOneImageLeavesTheRimsOfOthers) {
     image.setTo(0, outside);
     cv::imwrite(file(name), image);
   }
+  // What is missing is said first, and alone.
+  expect_error(reconstruct_with("images/transforms.json"),
+               "give --min-distance and --max-distance");
   const Outcome outcome = run(reconstruct_with("images/transforms.json") + range);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("right/1.png is black from"), std::string::npos) << outcome.output;

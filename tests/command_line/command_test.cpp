@@ -918,6 +918,26 @@ TEST_F(Command, CalibrationShowsConvertsAndChecks) {
 }
 
 /// A wide pinhole camera, and another one beside it that is turned a quarter about the axis.
+TEST_F(Command, CalibrationsHaveTheFormatOfTheirFilesNames) {
+  folder_.write("fisheye.yaml", R"(cam0:
+  camera_model: pinhole
+  intrinsics: [30, 30, 47, 48]
+  distortion_model: equidistant
+  distortion_coeffs: [0, 0, 0, 0]
+  resolution: [96, 96]
+)");
+  const auto first_line = [this](const std::string& name) {
+    const Outcome outcome = run("calibration convert " + file("fisheye.yaml") + " " + file(name));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    const std::string text = bytes_of(name);
+    return text.substr(0, text.find('\n'));
+  };
+  EXPECT_EQ(first_line("c.yaml"), "cam0:");
+  EXPECT_EQ(first_line("c.json"), "{");
+  EXPECT_EQ(first_line("C.JSON"), "{");
+  EXPECT_EQ(first_line("c.xml"), "<?xml version=\"1.0\"?>");
+}
+
 TEST_F(Command, CalibrationShowsFieldsOfViewAndWhereCamerasStand) {
   folder_.write("wide.yaml", R"(cam0:
   camera_model: pinhole
