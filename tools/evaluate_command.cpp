@@ -23,6 +23,7 @@
 
 namespace ws = widestereo;
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 namespace {
 
@@ -63,8 +64,8 @@ cv::Mat read_map(const std::string& file, int values, const std::string& what,
   return map;
 }
 
-/// Which view the map is of, as its name says where it is one of ours and the set, if there is one,
-/// has such a view; 0 otherwise.
+/// Which view the map is of, as its name says where it is one of ours and the set has such a view;
+/// 0 otherwise.
 int view_in_name(const fs::path& map, const fs::path& set) {
   const std::string stem = map.stem().string();
   for (const std::string name : {"distance_accepted", "distance"}) {
@@ -74,50 +75,54 @@ int view_in_name(const fs::path& map, const fs::path& set) {
     const char* end = number.data() + number.size();
     const auto [rest, error] = std::from_chars(number.data(), end, view);
     if (error != std::errc() || rest != end || view < 0) continue;
-    if (set.empty() || fs::exists(set / ("depth" + number + ".tiff"))) return view;
+    if (fs::exists(set / ("depth" + number + ".tiff"))) return view;
   }
   return 0;
 }
 
-/// Which of the calibration's cameras was the result's view of that number, as for matching they
-/// may have come in another order; none where the map has no record beside it.
-std::optional<int> camera_in_record(const fs::path& map, cv::Size size, int view,
-                                    const fs::path& calibration) {
-  using Json = nlohmann::ordered_json;
-  const Json record = record_in(map.parent_path());
-  const Json views = record.is_object() ? record.value("views", Json()) : Json();
-  const auto number = static_cast<std::size_t>(view);
-  if (!fs::exists(calibration) || !views.is_array() || number >= views.size() ||
-      !views[number].is_object()) {
-    return std::nullopt;
-  }
-  const std::vector<ws::View> cameras = ws::read_calibration(calibration, size).rig.views;
+/// Which of the cameras the map is of by the record beside it, which may have them in another
+/// order; none where it names none of them.
+std::optional<int> camera_in_record(const Json& record, const fs::path& map,
+                                    const std::vector<ws::View>& cameras) {
+  const auto view = view_with_file(record, map.filename().string());
+  if (!view) return std::nullopt;
+  const Json name = record["views"][*view].value("name", Json());
+  if (!name.is_string()) return std::nullopt;
+  // Of moving rigs it is FRAME/CAMERA.
+  const auto text = "/" + name.get<std::string>();
   const auto camera = std::find_if(cameras.begin(), cameras.end(), [&](const ws::View& other) {
-    return views[number].value("name", Json()) == Json(other.name);
+    return text.ends_with("/" + other.name);
   });
   if (camera == cameras.end()) return std::nullopt;
   return static_cast<int>(camera - cameras.begin());
 }
 
 /// `size`: of the map.
+int view_by_record_or_name(const EvaluateArguments& a, cv::Size size) {
+  if (a.set.empty() && a.calibration.empty()) return 0;
+  const fs::path calibration =
+      a.calibration.empty() ? fs::path(a.set) / calibration_of_set : fs::path(a.calibration);
+  const int in_name = a.set.empty() ? 0 : view_in_name(a.prediction, a.set);
+  if (!fs::exists(calibration)) return in_name;
+  const std::vector<ws::View> cameras = ws::read_calibration(calibration, size).rig.views;
+  const fs::path map = a.prediction;
+  const Json record = record_in(map.parent_path());
+  const auto in_record = camera_in_record(record, map, cameras);
+  const int view = in_record.value_or(in_name);
+  const bool is_guess = record.is_object() && !in_record && in_name == 0 && cameras.size() > 1;
+  if (view != 0 || in_name != 0 || is_guess) {
+    say(a.prediction + " is scored as of view " + std::to_string(view) +
+        (is_guess    ? ", as the record beside it names no camera of " + calibration.string()
+         : in_record ? ", by the record beside it"
+                     : ", by its name") +
+        "; --view chooses another.");
+  }
+  return view;
+}
+
+/// `size`: of the map.
 void choose_views(EvaluateArguments& a, cv::Size size) {
-  const auto by_record_or_name = [&] {
-    if (a.set.empty() && a.calibration.empty()) return 0;
-    const int in_name = view_in_name(a.prediction, a.set);
-    const auto in_record = camera_in_record(
-        a.prediction, size, in_name,
-        a.calibration.empty() ? fs::path(a.set) / calibration_of_set : fs::path(a.calibration));
-    // Without a set to say so, a number in a name may be anything.
-    if (a.set.empty() && !in_record) return 0;
-    const int view = in_record.value_or(in_name);
-    if (view != 0 || in_name != 0) {
-      say(a.prediction + " is scored as of view " + std::to_string(view) +
-          (view == in_name ? ", by its name" : ", by the record beside it") +
-          "; --view chooses another.");
-    }
-    return view;
-  };
-  a.view = a.view_of_map ? *a.view_of_map : by_record_or_name();
+  a.view = a.view_of_map ? *a.view_of_map : view_by_record_or_name(a, size);
   a.source = a.source_of_map.value_or(a.view == 0 ? 1 : 0);
 }
 

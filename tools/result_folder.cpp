@@ -36,6 +36,19 @@ Json json_in(const fs::path& file) {
   return Json::parse(std::ifstream(file), nullptr, false);
 }
 
+/// None where it is no record.
+Json views_of(const Json& record) {
+  const Json views = record.is_object() ? record.value("views", Json()) : Json();
+  return views.is_array() ? views : Json::array();
+}
+
+void append_files_of_view(const Json& view, std::vector<std::string>& files) {
+  if (!view.is_object() || !view.contains("files")) return;
+  for (const Json& file : view["files"]) {
+    if (file.is_string()) files.push_back(file.get<std::string>());
+  }
+}
+
 /// What a record names, where it is one of this program.
 void append_files(const Json& record, std::vector<std::string>& files) {
   if (!record.is_object() || !record.value("program", Json()).is_string() ||
@@ -317,14 +330,18 @@ std::optional<double> recorded_number(const fs::path& file, const std::string& p
 
 std::vector<std::string> files_of(const Json& record) {
   std::vector<std::string> files;
-  if (!record.is_object() || !record.contains("views")) return files;
-  for (const Json& view : record["views"]) {
-    if (!view.is_object() || !view.contains("files")) continue;
-    for (const Json& file : view["files"]) {
-      if (file.is_string()) files.push_back(file.get<std::string>());
-    }
-  }
+  for (const Json& view : views_of(record)) append_files_of_view(view, files);
   return files;
+}
+
+std::optional<std::size_t> view_with_file(const Json& record, const std::string& file) {
+  const Json views = views_of(record);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    std::vector<std::string> files;
+    append_files_of_view(views[i], files);
+    if (std::find(files.begin(), files.end(), file) != files.end()) return i;
+  }
+  return std::nullopt;
 }
 
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,

@@ -48,6 +48,9 @@ std::optional<double> recorded_number(const std::filesystem::path& file,
                                       const std::string& pointer);
 /// Names of the files that a record says are in its folder; none where it is no record.
 std::vector<std::string> files_of(const nlohmann::ordered_json& record);
+/// Which of the record's views has a file of that name; none where none has.
+std::optional<std::size_t> view_with_file(const nlohmann::ordered_json& record,
+                                          const std::string& file);
 
 /// Writes the folder; returns the record. Whenever the run ends, an earlier result and its files
 /// are there or, once the new ones are complete, replaced; the record comes last.

@@ -283,14 +283,16 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
         << said;
   }
   // By the result's record, whose views may be the cameras in another order.
-  folder_.write("result.json", R"({"views": [{"name": "cam1"}, {"name": "cam0"}, 3]})");
+  const std::string two_views = R"({"views": [
+    {"name": "cam1", "files": {"distance.tiff": "distance0.tiff"}},
+    {"name": "000001/cam0", "files": {"distance.tiff": "distance1403636579763555584.tiff"}}, 3]})";
+  folder_.write("result.json", two_views);
   const auto says = [this](const std::string& arguments, const char* text) {
     const std::string said = run("evaluate " + arguments + " --set " + file("set")).output;
     EXPECT_NE(said.find(text), std::string::npos) << said;
   };
   fs::copy_file(file("prediction.tiff"), file("distance0.tiff"));
   says(file("distance0.tiff"), "is scored as of view 1, by the record beside it");
-  says(file("distance1.tiff"), "is scored as of view 0, by the record beside it");
   EXPECT_EQ(run("evaluate " + file("distance0.tiff") + " --view 0 --set " + file("set"))
                 .output.find("is scored"),
             std::string::npos);
@@ -300,10 +302,11 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
             std::string::npos);
   const std::string timed = file("distance1403636579763555584.tiff");  // as of EuRoC's frames
   fs::copy_file(file("prediction.tiff"), timed);
-  EXPECT_NE(
-      run("evaluate " + timed + " --truth " + file("set/depth1.tiff") + " -c " + file("calib.yaml"))
-          .output.find("is scored as of view 1, by the record beside it"),
-      std::string::npos);
+  EXPECT_EQ(
+      run("evaluate " + timed + " --truth " + file("set/depth0.tiff") + " -c " + file("calib.yaml"))
+          .output.find("is scored"),
+      std::string::npos)
+      << "of camera 0 by the record";
   // As OpenCV's samples write them, without a size.
   folder_.write("opencv.yml",
                 "K1: [30, 0, 47.5, 0, 30, 47.5, 0, 0, 1]\nD1: [0, 0, 0, 0]\n"
@@ -311,11 +314,28 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
                 "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [-0.1, 0, 0]\n");
   says(file("distance0.tiff") + " -c " + file("opencv.yml"),
        "is scored as of view 1, by the record beside it");
-  for (const char* record : {R"({"views": [{"name": "left"}, {"name": 7}]})", "[]", "{"}) {
+  // A camera without ground truth is not scored against another one's.
+  folder_.write("result.json", two_views);
+  fs::rename(file("set/depth1.tiff"), file("depth1.tiff"));
+  expect_error("evaluate " + file("distance0.tiff") + " --view 1 --set " + file("set"),
+               "has no depth1.tiff; give --truth");
+  says(file("distance0.tiff"), "has no depth1.tiff; give --truth");
+  fs::rename(file("depth1.tiff"), file("set/depth1.tiff"));
+  for (const char* record :
+       {R"({"views": [{"name": "left", "files": ["distance0.tiff"]}, {"name": 7}]})",
+        R"({"views": 3})"}) {
     folder_.write("result.json", record);
     says(file("distance1.tiff"), "is scored as of view 1, by its name");
+    EXPECT_NE(run(alone).output.find("is scored as of view 0, as the record beside it names no "
+                                     "camera of " +
+                                     file("calib.yaml")),
+              std::string::npos);
   }
-  EXPECT_EQ(run(alone).output.find("is scored"), std::string::npos) << "of a frame's number";
+  for (const char* record : {"[]", "{"}) {
+    folder_.write("result.json", record);
+    says(file("distance1.tiff"), "is scored as of view 1, by its name");
+    EXPECT_EQ(run(alone).output.find("is scored"), std::string::npos) << "of a frame's number";
+  }
 }
 
 }  // namespace
