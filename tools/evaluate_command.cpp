@@ -20,6 +20,7 @@
 #include "widestereo/error.h"
 #include "widestereo/evaluation.h"
 #include "widestereo/image_io.h"
+#include "widestereo/sfm_model.h"
 
 namespace ws = widestereo;
 namespace fs = std::filesystem;
@@ -97,16 +98,22 @@ std::optional<int> camera_in_record(const Json& record, const fs::path& map,
   return static_cast<int>(camera - cameras.begin());
 }
 
-/// `size`: of the map.
-int view_by_record_or_name(const EvaluateArguments& a, cv::Size size) {
-  if (a.set.empty() && a.calibration.empty()) return 0;
+/// Whether the cameras are those of the record beside the map, as it was matched.
+bool takes_cameras_of_record(const EvaluateArguments& a) {
+  return a.calibration.empty() ? a.set.empty() : ws::is_sfm_model(a.calibration);
+}
+
+/// `record`: beside the map, if there is one; `size`: of the map.
+int view_by_record_or_name(const EvaluateArguments& a, const Json& record, cv::Size size) {
+  const fs::path map = a.prediction;
+  if (takes_cameras_of_record(a)) {
+    return static_cast<int>(view_with_file(record, map.filename().string()).value_or(0));
+  }
   const fs::path calibration =
       a.calibration.empty() ? fs::path(a.set) / calibration_of_set : fs::path(a.calibration);
   const int in_name = a.set.empty() ? 0 : view_in_name(a.prediction, a.set);
   if (!fs::exists(calibration)) return in_name;
   const std::vector<ws::View> cameras = ws::read_calibration(calibration, size).rig.views;
-  const fs::path map = a.prediction;
-  const Json record = record_in(map.parent_path());
   const auto in_record = camera_in_record(record, map, cameras);
   const int view = in_record.value_or(in_name);
   const bool is_guess = record.is_object() && !in_record && in_name == 0 && cameras.size() > 1;
@@ -120,9 +127,8 @@ int view_by_record_or_name(const EvaluateArguments& a, cv::Size size) {
   return view;
 }
 
-/// `size`: of the map.
-void choose_views(EvaluateArguments& a, cv::Size size) {
-  a.view = a.view_of_map ? *a.view_of_map : view_by_record_or_name(a, size);
+void choose_views(EvaluateArguments& a, const Json& record, cv::Size size) {
+  a.view = a.view_of_map ? *a.view_of_map : view_by_record_or_name(a, record, size);
   a.source = a.source_of_map.value_or(a.view == 0 ? 1 : 0);
 }
 
@@ -148,14 +154,53 @@ void take_from_set(EvaluateArguments& a) {
   if (a.calibration.empty()) throw ws::Error(a.set + " has no calib.yaml; give --calibration.");
 }
 
+/// The cameras, and where they come from.
+std::pair<ws::Rig, std::string> cameras_of(const EvaluateArguments& a, const Json& record,
+                                           cv::Size size) {
+  if (!takes_cameras_of_record(a)) {
+    return {ws::read_calibration(a.calibration, size).rig, a.calibration};
+  }
+  const fs::path map = a.prediction;
+  if (view_with_file(record, map.filename().string())) {
+    const std::string name = (map.parent_path() / result_record).string();
+    return {rig_in(record, name), name};
+  }
+  if (a.calibration.empty()) {
+    throw ws::Error(
+        "Give --truth and --calibration, or a folder with both by --set; the cameras of a map in "
+        "the folder of its result are known.");
+  }
+  throw ws::Error(
+      a.calibration +
+      " is a COLMAP model or transforms.json, whose images are scored in the folders of "
+      "their results, where " +
+      a.prediction + " is not; give the map there, or another --calibration.");
+}
+
+/// Throws Error where something is asked for that a single camera does not tell. `cameras`: what
+/// has it.
+void report_single_camera(const EvaluateArguments& a, const Json& record,
+                          const std::string& cameras) {
+  if (!a.confidence.empty() || a.far_distance > 0) {
+    throw ws::Error(std::string(a.confidence.empty() ? "--far-distance" : "--confidence") +
+                    " needs another camera, in which displacements are measured, but " + cameras +
+                    " has one; leave it out, or give a calibration of two or more.");
+  }
+  const fs::path map = a.prediction;
+  const bool has_others = view_with_file(record, map.filename().string()) &&
+                          record["views"].size() > 1 && !takes_cameras_of_record(a);
+  say(cameras + " has one camera: displacements in another image are not measured" +
+      (has_others ? "; without --calibration they are in those of the record beside the map."
+                  : "."));
+}
+
 void run_evaluate(EvaluateArguments a) {
   const cv::Mat prediction = read_map(a.prediction, 1, "a distance map",
                                       png_scale_of("--png-scale", a.png_scale, a.prediction));
-  choose_views(a, prediction.size());
+  const Json record = record_in(fs::path(a.prediction).parent_path());
+  choose_views(a, record, prediction.size());
   if (!a.set.empty()) take_from_set(a);
-  if (a.truth.empty() || a.calibration.empty()) {
-    throw ws::Error("Give --truth and --calibration, or a folder with both by --set.");
-  }
+  if (a.truth.empty()) throw ws::Error("Give --truth, or a folder with it by --set.");
   if (!a.error_map.empty()) {
     require_other_file(a.error_map,
                        {a.prediction, a.normals, a.confidence, a.truth, a.valid, a.occlusion,
@@ -190,17 +235,22 @@ void run_evaluate(EvaluateArguments a) {
     if (map.empty()) continue;
     require_same_size(map, file, prediction, a.prediction, "use maps of one view");
   }
-  const ws::Rig rig = ws::read_calibration(a.calibration, prediction.size()).rig;
+  const auto [rig, cameras] = cameras_of(a, record, prediction.size());
   const int views = static_cast<int>(rig.views.size());
-  if (a.view < 0 || a.view >= views || a.source < 0 || a.source >= views || a.view == a.source) {
-    throw ws::Error(a.calibration + " has " + std::to_string(views) +
+  const bool is_single = views == 1 && a.view == 0 && !a.source_of_map;
+  if (is_single) {
+    report_single_camera(a, record, cameras);
+  } else if (a.view < 0 || a.view >= views || a.source < 0 || a.source >= views ||
+             a.view == a.source) {
+    throw ws::Error(cameras + " has " + std::to_string(views) +
                     " camera(s); choose two different ones by --view and --source.");
   }
   if (!a.image.empty()) {
     truth.image = stretched_within_view(truth.image, rig.views[a.view], a.image);
   }
   const std::vector<ws::RegionScores> scores =
-      ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
+      is_single ? ws::evaluate(prediction, normals, truth, rig.views[a.view])
+                : ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
   ws::FarScores far;
   if (a.far_distance > 0) {
     far = ws::far_scores(prediction, truth, rig.views[a.view], rig.views[a.source], a.far_distance);
@@ -264,14 +314,18 @@ void add_evaluate_command(CLI::App& app) {
       ->add_option("--field-of-view", a->field_of_view,
                    "Mask, 0 = outside the lens; for --far-distance")
       ->needs(far_distance);
-  command->add_option("-c,--calibration", a->calibration, "Calibration of the views");
+  command->add_option(
+      "-c,--calibration", a->calibration,
+      "Calibration of the views (default: calib.yaml of --set, or else the views of "
+      "the result's record, which also stand for a COLMAP model)");
   command->add_option(
       "--view", a->view_of_map,
       "Camera of the distance map (default: the one that the result's record names, "
       "or else with --set the number in its name, or else 0)");
   command->add_option(
       "--source", a->source_of_map,
-      "Camera in which displacements are measured (default 1, or 0 for another view)");
+      "Camera in which displacements are measured (default 1, or 0 for another view; none where "
+      "there is but one)");
   command->add_option("--error-map", a->error_map, "Write a picture of the relative error");
   command->add_flag("--json", a->as_json, "Print JSON");
   command->callback([a] { run_evaluate(*a); });

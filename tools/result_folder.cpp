@@ -123,6 +123,28 @@ void move_result(const fs::path& from, const fs::path& to, const Json& record) {
   }
 }
 
+/// As ViewWriter describes it.
+ws::View view_in(const Json& record) {
+  ws::View view;
+  view.name = record.at("name");
+  ws::Camera& camera = view.camera;
+  const std::string model = record.at("model");
+  int number = 0;
+  while (to_string(static_cast<ws::CameraModel>(number)) != model) ++number;
+  camera.model = static_cast<ws::CameraModel>(number);
+  camera.width = record.at("width");
+  camera.height = record.at("height");
+  camera.max_theta = record.at("max_theta_degrees").get<double>() * ws::radians_per_degree;
+  const Json& intrinsics = record.at("intrinsics");
+  for (const auto& [name, member] : ws::intrinsics()) {
+    camera.*member = intrinsics.value(name, camera.*member);
+  }
+  for (int i = 0; i < 12; ++i) {
+    view.world_from_camera(i / 4, i % 4) = record.at("world_from_camera").at(i);
+  }
+  return view;
+}
+
 /// Writes the files of one view and notes their names.
 class ViewWriter {
  public:
@@ -342,6 +364,17 @@ std::optional<std::size_t> view_with_file(const Json& record, const std::string&
     if (std::find(files.begin(), files.end(), file) != files.end()) return i;
   }
   return std::nullopt;
+}
+
+ws::Rig rig_in(const Json& record, const std::string& name) {
+  ws::Rig rig;
+  try {
+    for (const Json& view : views_of(record)) rig.views.push_back(view_in(view));
+  } catch (const std::exception&) {  // JSON's own, and of unknown models
+    throw ws::Error(name + " is damaged or of another version; give --calibration.");
+  }
+  ws::validate(rig, name);
+  return rig;
 }
 
 Json write_result_folder(const fs::path& folder, const FolderContents& contents,

@@ -51,6 +51,8 @@ std::vector<std::string> files_of(const nlohmann::ordered_json& record);
 /// Which of the record's views has a file of that name; none where none has.
 std::optional<std::size_t> view_with_file(const nlohmann::ordered_json& record,
                                           const std::string& file);
+/// The record's views as they were matched, without masks; `name`, the file, begins messages.
+widestereo::Rig rig_in(const nlohmann::ordered_json& record, const std::string& name);
 
 /// Writes the folder; returns the record. Whenever the run ends, an earlier result and its files
 /// are there or, once the new ones are complete, replaced; the record comes last.

@@ -77,6 +77,9 @@ struct RegionScores {
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source);
+/// The same of a view alone, without displacements.
+std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
+                                   const GroundTruth& truth, const View& reference);
 
 /// The scores as a fixed-width table and as JSON text.
 std::string to_table(const std::vector<RegionScores>& scores);

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <tuple>
 
 #include "evaluation/ground_truth.h"
@@ -128,15 +129,17 @@ double confidence_at(const cv::Mat& confidence, int x, int y) {
               ", " + std::to_string(y) + "); give one of numbers from 0 to 1.");
 }
 
+/// `source`: null where nothing is projected into another view.
 std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
                             const cv::Mat& confidence, const GroundTruth& truth,
-                            const View& reference, const View& source) {
+                            const View& reference, const View* source) {
   const cv::Size size = distance.size();
   require_maps(distance, truth, reference);
   require_optional_map(normals, size, CV_32FC3, "The normal map");
   require_optional_map(confidence, size, CV_32FC1, "The confidence map");
   const cv::Mat rays = ray_image(reference.camera, {});
-  const SourceView source_view(source, reference);
+  std::optional<SourceView> source_view;
+  if (source != nullptr) source_view.emplace(*source, reference);
   std::vector<Sample> samples;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -153,13 +156,13 @@ std::vector<Sample> collect(const cv::Mat& distance, const cv::Mat& normals,
           truth.occlusion.empty() || truth.occlusion.at<uchar>(y, x) == visible_label;
       if (!confidence.empty()) sample.confidence = confidence_at(confidence, x, y);
       Eigen::Vector2d expected;
-      sample.in_source = source_view.in_image(sample.truth * ray, expected);
+      sample.in_source = source_view && source_view->in_image(sample.truth * ray, expected);
       const float d = distance.at<float>(y, x);
       sample.predicted = has_distance(d);
       if (!sample.predicted) continue;
       sample.error = std::abs(static_cast<double>(d) - sample.truth);
       if (sample.in_source) {
-        sample.displacement = source_view.displacement(static_cast<double>(d) * ray, expected);
+        sample.displacement = source_view->displacement(static_cast<double>(d) * ray, expected);
       }
       if (!normals.empty() && !truth.normals.empty()) {
         sample.normal_angle =
@@ -175,7 +178,7 @@ std::vector<Sample> collect_confident(const cv::Mat& distance, const cv::Mat& co
                                       const GroundTruth& truth, const View& reference,
                                       const View& source) {
   require_type(confidence, CV_32FC1, "The confidence map");
-  return collect(distance, {}, confidence, truth, reference, source);
+  return collect(distance, {}, confidence, truth, reference, &source);
 }
 
 /// Within right_pixels of its true place in the source; false where the predicted point does not
@@ -245,6 +248,45 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
   return scores;
 }
 
+/// Over every region.
+std::vector<RegionScores> score_regions(const std::vector<Sample>& samples,
+                                        const GroundTruth& truth, const View& reference) {
+  const auto score_where = [&](const std::string& region, auto belongs) {
+    std::vector<const Sample*> chosen;
+    for (const Sample& sample : samples) {
+      if (belongs(sample)) chosen.push_back(&sample);
+    }
+    return score(region, chosen);
+  };
+  const auto band = [&](const std::string& name, double from, double to) {
+    return score_where(name, [from, to](const Sample& s) {
+      return s.non_occluded && s.theta >= from && s.theta < to;
+    });
+  };
+  std::vector<RegionScores> scores = {score_where("all", [](const Sample&) { return true; })};
+  if (!truth.occlusion.empty()) {
+    scores.push_back(score_where("non-occluded", [](const Sample& s) { return s.non_occluded; }));
+  }
+  for (const auto& [name, from, to] :
+       {std::tuple("0-30 deg", 0, 30), std::tuple("30-60 deg", 30, 60),
+        std::tuple("60-90 deg", 60, 90), std::tuple(">90 deg", 90, 181)}) {
+    scores.push_back(band(name, from, to));
+  }
+  if (!truth.image.empty()) {
+    const cv::Mat rays = ray_image(reference.camera, {});
+    const cv::Mat textured = textured_pixels(truth.image, inside_field_of_view(rays));
+    const cv::Mat interior = textured & interior_pixels(truth, rays);
+    const auto within = [&](const std::string& region, const cv::Mat& mask) {
+      return score_where(region, [&mask](const Sample& s) {
+        return s.non_occluded && mask.at<uchar>(s.pixel) != 0;
+      });
+    };
+    scores.push_back(within("textured", textured));
+    scores.push_back(within("textured interior", interior));
+  }
+  return scores;
+}
+
 }  // namespace
 
 void require_truth(const cv::Mat& distance, const GroundTruth& truth) {
@@ -283,41 +325,12 @@ cv::Mat textured_pixels(const cv::Mat& image, const cv::Mat& field_of_view) {
 std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
                                    const GroundTruth& truth, const View& reference,
                                    const View& source) {
-  const std::vector<Sample> samples = collect(distance, normals, {}, truth, reference, source);
-  const auto score_where = [&](const std::string& region, auto belongs) {
-    std::vector<const Sample*> chosen;
-    for (const Sample& sample : samples) {
-      if (belongs(sample)) chosen.push_back(&sample);
-    }
-    return score(region, chosen);
-  };
-  const auto band = [&](const std::string& name, double from, double to) {
-    return score_where(name, [from, to](const Sample& s) {
-      return s.non_occluded && s.theta >= from && s.theta < to;
-    });
-  };
-  std::vector<RegionScores> scores = {score_where("all", [](const Sample&) { return true; })};
-  if (!truth.occlusion.empty()) {
-    scores.push_back(score_where("non-occluded", [](const Sample& s) { return s.non_occluded; }));
-  }
-  for (const auto& [name, from, to] :
-       {std::tuple("0-30 deg", 0, 30), std::tuple("30-60 deg", 30, 60),
-        std::tuple("60-90 deg", 60, 90), std::tuple(">90 deg", 90, 181)}) {
-    scores.push_back(band(name, from, to));
-  }
-  if (!truth.image.empty()) {
-    const cv::Mat rays = ray_image(reference.camera, {});
-    const cv::Mat textured = textured_pixels(truth.image, inside_field_of_view(rays));
-    const cv::Mat interior = textured & interior_pixels(truth, rays);
-    const auto within = [&](const std::string& region, const cv::Mat& mask) {
-      return score_where(region, [&mask](const Sample& s) {
-        return s.non_occluded && mask.at<uchar>(s.pixel) != 0;
-      });
-    };
-    scores.push_back(within("textured", textured));
-    scores.push_back(within("textured interior", interior));
-  }
-  return scores;
+  return score_regions(collect(distance, normals, {}, truth, reference, &source), truth, reference);
+}
+
+std::vector<RegionScores> evaluate(const cv::Mat& distance, const cv::Mat& normals,
+                                   const GroundTruth& truth, const View& reference) {
+  return score_regions(collect(distance, normals, {}, truth, reference, nullptr), truth, reference);
 }
 
 FarScores far_scores(const cv::Mat& distance, const GroundTruth& truth, const View& reference,

@@ -58,6 +58,39 @@ class ColmapCommand : public test::Command {
   }
 };
 
+TEST_F(ColmapCommand, MapsAreScoredWithTheViewsOfTheirRecord) {
+  ASSERT_EQ(run(depth("model", "out")).exit_code, 0);
+  cv::imwrite(file("truth.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
+  const auto evaluate = [this](const std::string& map, const std::string& views) {
+    return run("evaluate " + file(map) + " --json --truth " + file("truth.tiff") + views);
+  };
+  const auto scores = [&evaluate](const std::string& map, const std::string& views) {
+    const Outcome outcome = evaluate(map, views);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return json_of(outcome)["regions"];
+  };
+  for (const auto& [map, views] : {std::pair("out/distance0.tiff", " --view 0 --source 1"),
+                                   std::pair("out/distance1.tiff", " --view 1 --source 0")}) {
+    const nlohmann::json expected = scores(map, " -c " + file("same.yaml") + views);
+    EXPECT_TRUE(expected[0]["median_pixels"].is_number());
+    for (const std::string& calibration : {std::string(), " -c " + file("model")}) {
+      EXPECT_EQ(scores(map, calibration), expected) << map << calibration;
+    }
+  }
+  const auto refuses = [&evaluate](const std::string& map, const std::string& views,
+                                   const std::string& message) {
+    const Outcome outcome = evaluate(map, views);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_NE(outcome.output.find(message), std::string::npos) << outcome.output;
+  };
+  std::filesystem::copy_file(file("out/distance0.tiff"), file("elsewhere.tiff"));
+  refuses("elsewhere.tiff", " -c " + file("model"),
+          file("elsewhere.tiff") + " is not; give the map there");
+  refuses("elsewhere.tiff", "", "Give --truth and --calibration");
+  folder_.write("out/result.json", R"({"views": [{"name": "a", "files": ["distance0.tiff"]}]})");
+  refuses("out/distance0.tiff", "", file("out/result.json") + " is damaged");
+}
+
 TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
   const Outcome colmap = run(depth("model", "colmap"));
   ASSERT_EQ(colmap.exit_code, 0) << colmap.output;

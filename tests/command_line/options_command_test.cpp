@@ -338,5 +338,27 @@ TEST_F(EvaluateSets, FilesAreOfTheView) {
   }
 }
 
+TEST_F(EvaluateSets, OneCameraIsScoredWithoutDisplacements) {
+  write_first_camera();
+  const std::string evaluate = "evaluate " + file("prediction.tiff") + " --truth " +
+                               file("set/depth0.tiff") + " -c " + file("mono.yaml");
+  const Outcome outcome = run(evaluate + " --json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find(file("mono.yaml") + " has one camera: displacements in another "
+                                                    "image are not measured.\n"),
+            std::string::npos)
+      << outcome.output;
+  const nlohmann::json all = json_of(outcome)["regions"][0];
+  EXPECT_GT(all["bad_relative"]["0.05"], 0.3);
+  EXPECT_TRUE(all["bad_pixels"]["2.0"].is_null());
+  cv::imwrite(file("confidence.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(0.5)));
+  expect_error(evaluate + " --confidence " + file("confidence.tiff"),
+               "--confidence needs another camera");
+  expect_error(evaluate + " --source 0", "choose two different ones by --view and --source");
+  folder_.write("result.json", R"({"views": [{"name": "0", "files": ["prediction.tiff"]}, {}]})");
+  EXPECT_NE(run(evaluate).output.find("without --calibration they are in those of the record"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace widestereo::test

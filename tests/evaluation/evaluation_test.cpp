@@ -153,6 +153,21 @@ TEST_F(FourPixels, EveryFigureIsInItsColumnAndUnderItsKey) {
                            "  30.0\n"));
 }
 
+TEST_F(FourPixels, AViewAloneHasNoDisplacements) {
+  truth_.normals = cv::Mat(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
+  const std::vector<RegionScores> alone =
+      evaluate(truth_.distance * 1.015, truth_.normals, truth_, reference_);
+  EXPECT_EQ(alone[0].pixels, 4);
+  EXPECT_EQ(alone[0].bad_relative.at(0.01), 1);
+  EXPECT_EQ(alone[0].bad_relative.at(0.02), 0);
+  EXPECT_EQ(alone[0].mean_normal_angle, 0);
+  EXPECT_EQ(region(alone, "0-30 deg").pixels, 4);
+  EXPECT_TRUE(std::isnan(alone[0].bad_pixels.at(2)));
+  EXPECT_TRUE(std::isnan(alone[0].bad_pixels_predicted.at(2)));
+  EXPECT_TRUE(std::isnan(alone[0].median_pixels));
+  EXPECT_THAT(to_table(alone), ::testing::HasSubstr("|      -      -      - |       - "));
+}
+
 TEST_F(FourPixels, OcclusionAndNormalsCount) {
   truth_.occlusion = (cv::Mat_<uchar>(2, 4) << 255, 0, 128, 255, 255, 255, 255, 255);
   truth_.normals = cv::Mat(2, 4, CV_32FC3, cv::Scalar(0, 0, -1));
