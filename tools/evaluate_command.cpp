@@ -259,6 +259,10 @@ void run_evaluate(EvaluateArguments a) {
     throw ws::Error("There is no pixel to score in " + a.truth +
                     ": none has a true distance and is valid; check it and --valid.");
   }
+  if (scores.size() > 1 && scores[1].region == "non-occluded" && scores[1].pixels == 0) {
+    say("No pixel that is scored is visible (255) in " + a.occlusion +
+        ", so that there are no scores of what is not occluded.");
+  }
   std::vector<ws::SparsificationPoint> curve;
   std::vector<ws::ReliabilityBin> bins;
   if (!a.confidence.empty()) {

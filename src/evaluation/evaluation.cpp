@@ -248,6 +248,18 @@ RegionScores score(const std::string& region, const std::vector<const Sample*>& 
   return scores;
 }
 
+void require_occlusion_labels(const cv::Mat& occlusion) {
+  for (int y = 0; y < occlusion.rows; ++y) {
+    for (int x = 0; x < occlusion.cols; ++x) {
+      const uchar label = occlusion.at<uchar>(y, x);
+      if (label == visible_label || label == hidden_label || label == outside_label) continue;
+      throw Error("The occlusion map has " + std::to_string(label) + " at pixel (" +
+                  std::to_string(x) + ", " + std::to_string(y) + "); give 255 for what the " +
+                  "source view sees, 0 for what is occluded and 128 for what is outside.");
+    }
+  }
+}
+
 /// Over every region.
 std::vector<RegionScores> score_regions(const std::vector<Sample>& samples,
                                         const GroundTruth& truth, const View& reference) {
@@ -295,6 +307,7 @@ void require_truth(const cv::Mat& distance, const GroundTruth& truth) {
   require_map(truth.distance, size, CV_32FC1, "The ground truth");
   require_optional_map(truth.valid, size, CV_8UC1, "The mask of valid pixels");
   require_optional_map(truth.occlusion, size, CV_8UC1, "The occlusion map");
+  require_occlusion_labels(truth.occlusion);
   require_optional_map(truth.normals, size, CV_32FC3, "The ground truth of normals");
   require_optional_map(truth.image, size, CV_8UC1, "The reference image");
   require_optional_map(truth.field_of_view, size, CV_8UC1, "The mask of the field of view");

@@ -244,6 +244,16 @@ TEST_F(EvaluateSets, AreFoundByTheirNames) {
   cv::imwrite(file("set/occ0_1.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
   EXPECT_EQ(wrong_of(set), std::pair(all, all)) << "of the pair before that of the view";
   EXPECT_EQ(wrong_of(set + " --occlusion " + file("occlusion.png")), std::pair(all, 0.0));
+  cv::imwrite(file("hidden.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(0)));
+  EXPECT_EQ(wrong_of(set + " --occlusion " + file("hidden.png")).first, all);
+  EXPECT_NE(
+      run("evaluate " + file("prediction.tiff") + " " + set + " --occlusion " + file("hidden.png"))
+          .output.find("No pixel that is scored is visible (255) in " + file("hidden.png")),
+      std::string::npos);
+  cv::imwrite(file("ones.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(1)));
+  expect_error(
+      "evaluate " + file("prediction.tiff") + " " + set + " --occlusion " + file("ones.png"),
+      "The occlusion map has 1 at pixel (0, 0)");
   // And so is what is valid.
   fs::copy_file(file("occlusion.png"), file("set/valid0.png"));
   EXPECT_EQ(wrong_of(set).first, 0);

@@ -437,6 +437,12 @@ TEST(Evaluation, MapsThatDoNotFitAreNamed) {
   truth.valid = mask;
   truth.occlusion = mask.rowRange(0, 1);
   EXPECT_THAT(picture(cost), HasSubstr("occlusion map is 4x1"));
+  truth.occlusion = cv::Mat(2, 4, CV_8UC1, cv::Scalar(255));
+  truth.occlusion.at<uchar>(0, 1) = 128;
+  truth.occlusion.at<uchar>(0, 2) = 0;
+  EXPECT_EQ(picture(cost), "");
+  truth.occlusion.at<uchar>(1, 3) = 1;
+  EXPECT_THAT(picture(cost), HasSubstr("occlusion map has 1 at pixel (3, 1); give 255"));
 }
 
 /// The left half is blank: textured from column 19.
