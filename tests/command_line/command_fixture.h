@@ -67,10 +67,11 @@ inline std::string with_quoted_folders(const std::string& arguments) {
   return words;
 }
 
-inline Outcome run(const std::string& arguments, const std::string& environment = "") {
+/// A program with its arguments, but for folders that they name.
+inline Outcome run_program(const std::string& program, const std::string& arguments,
+                           const std::string& environment = "") {
   // Leaks of drivers are not the command's.
-  const std::string command = environment + " ASAN_OPTIONS=detect_leaks=0 " +
-                              shell_word(WIDESTEREO_COMMAND) + " " +
+  const std::string command = environment + " ASAN_OPTIONS=detect_leaks=0 " + program + " " +
                               with_quoted_folders(arguments) + " 2>&1 < /dev/null";
   Outcome outcome;
   FILE* pipe = popen(command.c_str(), "r");
@@ -83,6 +84,10 @@ inline Outcome run(const std::string& arguments, const std::string& environment 
   const int status = pclose(pipe);
   if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
   return outcome;
+}
+
+inline Outcome run(const std::string& arguments, const std::string& environment = "") {
+  return run_program(shell_word(WIDESTEREO_COMMAND), arguments, environment);
 }
 
 /// A rendered pair with its calibration, and options that make matching quick.

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT
+// The scripts that match and score data sets, with a stand-in for what matches.
+#include "command_fixture.h"
+
+namespace widestereo::test {
+namespace {
+
+class ScoreScripts : public Command {
+ protected:
+  /// `matching`: what to do where a map is asked for, with the folder for results in $2; scoring
+  /// is the command's own.
+  void write_stand_in(const std::string& matching) const {
+    folder_.write("stand_in",
+                  "#!/usr/bin/env bash\nset -euo pipefail\n"
+                  "if [[ $1 == evaluate ]]; then exec " +
+                      shell_word(WIDESTEREO_COMMAND) +
+                      " \"$@\"; fi\n"
+                      "cd \"$(dirname \"$0\")\"\n"
+                      "echo \"$*\" >> calls\n"
+                      "while [[ $1 != -o ]]; do shift; done\n" +
+                      matching);
+    fs::permissions(folder_ / "stand_in", fs::perms::owner_all);
+  }
+  Outcome run_script(const std::string& name, const std::string& arguments) const {
+    return run_program(shell_word(std::string(WIDESTEREO_SOURCE_DIR) + "/tools/" + name), arguments,
+                       "WIDESTEREO=" + shell_word(file("stand_in")));
+  }
+  void write_distances(const std::string& name, double metres) const {
+    cv::imwrite(file(name), cv::Mat(96, 96, CV_32FC1, cv::Scalar(metres)));
+  }
+};
+
+TEST_F(ScoreScripts, AblationTakesSetsThatLackNormals) {
+  for (const std::string set : {"bare", "full"}) {
+    fs::create_directories(folder_ / set);
+    fs::copy_file(file("calib.yaml"), file(set + "/calib.yaml"));
+    write_distances(set + "/depth0.tiff", 2);
+  }
+  for (const std::string camera : {"cam0", "cam1"}) {
+    fs::create_directories(folder_ / ("bare/" + camera));
+    fs::copy_file(file("left.png"), file("bare/" + camera + "/000.png"));
+    fs::copy_file(file("left.png"), file("full/" + camera + ".png"));
+  }
+  cv::imwrite(file("bare/mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
+  cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
+  fs::copy_file(file("normals.tiff"), file("full/normal0.tiff"));
+  write_distances("map.tiff", 2.1);
+  write_stand_in(
+      "mkdir -p \"$2\"; cp map.tiff \"$2/distance0.tiff\"\n"
+      "cp normals.tiff \"$2/normals0.tiff\"\n"
+      "echo 'CPU: 1.50 s, 7 million patch samples (preset fast)'\n");
+  const std::string sets = "'" + file("bare") + " 0.5 9' '" + file("full") + " 0.5 9'";
+  const Outcome outcome = run_script("ablation", file("out") + " fast " + sets);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("| change | bare | full | million samples | seconds |"),
+            std::string::npos)
+      << outcome.output;
+  EXPECT_NE(outcome.output.find(
+                "| none | 100.0 / 0.0 / – | 100.0 / 0.0 / 0.0° | 7 | 1.50 |\n| no plane "),
+            std::string::npos)
+      << outcome.output;
+  const std::string calls = bytes_of("calls");
+  EXPECT_NE(calls.find("bare/cam1/000.png"), std::string::npos);
+  EXPECT_NE(calls.find("--mask " + file("bare/mask.png")), std::string::npos);
+  EXPECT_NE(calls.find("--no-pictures --far-preference 0\n"), std::string::npos);
+  fs::remove(file("full/depth0.tiff"));
+  const Outcome unknown = run_script("ablation", file("out") + " fast " + sets);
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_NE(unknown.output.find("full has no depth0.tiff"), std::string::npos) << unknown.output;
+}
+
+}  // namespace
+}  // namespace widestereo::test
