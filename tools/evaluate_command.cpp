@@ -305,8 +305,10 @@ void add_evaluate_command(CLI::App& app) {
   command->add_option("--occlusion", a->occlusion,
                       "255 visible in the source, 0 occluded, 128 outside");
   command->add_option("--truth-normals", a->truth_normals, "Ground truth of the normals");
-  command->add_option("--image", a->image,
-                      "The view's image: scores textured surfaces, and their interiors, as well");
+  command->add_option(
+      "--image", a->image,
+      "The view's image: scores textured surfaces, and their interiors (without true "
+      "normals: away from steps of the distance), as well");
   a->white_level.add_to(*command);
   CLI::Option* far_distance =
       command

@@ -46,7 +46,8 @@ constexpr double interior_edge_clearance = 8;  ///< pixels
 struct RegionScores {
   /// "all", where occlusion is known "non-occluded", then by angle "0-30 deg", "30-60 deg",
   /// "60-90 deg" and ">90 deg", and where there is an image "textured" and "textured interior"
-  /// (textured, and not at an edge of the true scene).
+  /// (textured, and not at an edge of the true scene) or, where true normals are not known,
+  /// "textured no steps" (not at an edge of the true distances).
   std::string region;
   long pixels = 0;          ///< pixels scored
   double completeness = 0;  ///< share with a prediction, 0 of no pixel

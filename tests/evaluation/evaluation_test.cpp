@@ -324,6 +324,14 @@ TEST_F(TexturedScene, SmallStepsAreNoEdges) {
   EXPECT_EQ(interior().pixels, 60);
 }
 
+TEST_F(TexturedScene, WithoutNormalsCreasesAreNotKnownAndTheRegionSaysSo) {
+  truth_.normals.release();
+  EXPECT_EQ(textured({}).pixels, 504);
+  EXPECT_THROW(interior(), std::out_of_range);
+  EXPECT_EQ(region(scores_, "textured no steps").pixels, 5 * 24);
+  EXPECT_NE(to_table(scores_).find("textured no steps      120 "), std::string::npos);
+}
+
 TEST_F(TexturedScene, TheBorderOfTheFieldOfViewIsNoTexture) {
   reference_.camera.max_theta = std::atan(0.1);  // 10 pixels
   truth_.image.setTo(0);
