@@ -69,5 +69,53 @@ TEST_F(ScoreScripts, AblationTakesSetsThatLackNormals) {
   EXPECT_NE(unknown.output.find("full has no depth0.tiff"), std::string::npos) << unknown.output;
 }
 
+/// Of three frames with 7 of 1600 pixels wrong, which are 0.4375 %.
+class ScoreScriptsOfFrames : public ScoreScripts {
+ protected:
+  void SetUp() override {
+    ScoreScripts::SetUp();
+    for (const char* folder : {"set/depth0", "set/valid0", "set/occ0_cam1"}) {
+      fs::create_directories(folder_ / folder);
+    }
+    fs::copy_file(file("calib.yaml"), file("set/calib.yaml"));
+    cv::Mat valid(96, 96, CV_8UC1, cv::Scalar(0));
+    valid(cv::Rect(28, 28, 40, 40)).setTo(255);
+    for (const std::string frame : {"000000", "000001", "000002"}) {
+      write_distances("set/depth0/" + frame + ".tiff", 2);
+      cv::imwrite(file("set/valid0/" + frame + ".png"), valid);
+      cv::imwrite(file("set/occ0_cam1/" + frame + ".png"), valid);
+    }
+    cv::Mat map(96, 96, CV_32FC1, cv::Scalar(2));
+    map(cv::Rect(40, 40, 7, 1)).setTo(0.5);
+    cv::imwrite(file("map.tiff"), map);
+  }
+};
+
+TEST_F(ScoreScriptsOfFrames, MeansOfSequencesAreOfFiguresThatAreNotRounded) {
+  write_stand_in(
+      "for frame in 000000 000001 000002; do\n"
+      "  mkdir -p \"$2/$frame\"; cp map.tiff \"$2/$frame/distance0.tiff\"\n"
+      "  echo \"$frame: warm, motion estimated, 1.50 s, 90.0 % accepted\"\ndone\n");
+  const Outcome outcome = run_script("score_sequence", file("out") + " " + file("set") + " 0.5 9");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("| 000002 | warm | 1.50 | 0.4 / 0.4 |\n"
+                                "| mean of all but the first | | 1.50 | 0.44 / 0.44 |\n"),
+            std::string::npos)
+      << outcome.output;
+}
+
+TEST_F(ScoreScriptsOfFrames, MeansOfReconstructionsAreOfFiguresThatAreNotRounded) {
+  write_stand_in(
+      "for frame in 000000 000001 000002; do\n"
+      "  mkdir -p \"$2/$frame/cam0\"; cp map.tiff \"$2/$frame/cam0/distance0.tiff\"\n"
+      "done\necho '6 images, 92.8 % accepted on average; 1234 points in cloud.ply'\n");
+  const Outcome outcome =
+      run_script("score_reconstruction", file("out") + " " + file("set") + " 0.5 9");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("| 6 | 0.4 / 0.4 / 0.44 | 100.0 | 92.8 | 1234 |\n"),
+            std::string::npos)
+      << outcome.output;
+}
+
 }  // namespace
 }  // namespace widestereo::test
