@@ -7,6 +7,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "geometry/angle.h"
+
 namespace ws = widestereo;
 using Json = nlohmann::ordered_json;
 
@@ -47,7 +49,7 @@ Json to_json(const ws::View& view) {
           {"model", to_string(c.model)},
           {"size", {c.width, c.height}},
           {"intrinsics", intrinsics_of(c)},
-          {"max_theta", c.max_theta},
+          {"max_theta_degrees", c.max_theta * ws::degrees_per_radian},
           {"world_from_camera", to_json(view.world_from_camera)},
           {"masked_pixels", view.mask.empty() ? 0 : cv::countNonZero(view.mask == 0)},
           {"mask_hash", mask_hash(view.mask)}};

@@ -163,7 +163,7 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
           {"masks", absolute_path(a.images.masks)},
           {"white_level", a.images.white_level.value()},
           {"max_image_size", a.images.size.value()},
-          {"max_theta", a.images.rig.max_theta},
+          {"max_theta_degrees", a.images.rig.max_theta},
           {"sources", std::max(sources_of(a), groups.front().size() - 1)},
           {"clouds", !a.format.no_cloud},
           {"pictures", !a.format.no_pictures},

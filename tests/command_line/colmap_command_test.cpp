@@ -283,7 +283,7 @@ TEST_F(ReconstructCommand, TakesUpWhatIsLeftToDo) {
   EXPECT_GT(bytes_of("out/cloud.ply").size(), cloud.size());
   expect_error(reconstruct() + "--max-cost 0.3", "made with other settings: options/max_cost");
   expect_error(reconstruct() + "--max-image-size 48", "made with other settings: max_image_size");
-  expect_error(reconstruct() + "--max-theta 50", "made with other settings: max_theta");
+  expect_error(reconstruct() + "--max-theta 50", "made with other settings: max_theta_degrees");
   ASSERT_EQ(run(reconstruct() + "--max-cost 0.3 --overwrite").exit_code, 0);
 }
 
@@ -650,6 +650,10 @@ TEST_F(TransformsCommand, AMaskOfOneImageLeavesTheRimsOfOthers) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("right/1.png is black from"), std::string::npos) << outcome.output;
   EXPECT_LT(record_of("out/right/1.png")["views"][0]["max_theta_degrees"], 120);
+  const nlohmann::json group = record()["images"][0]["group"];
+  EXPECT_EQ(group[0]["max_theta_degrees"], 180);
+  EXPECT_LT(group[1]["max_theta_degrees"], 120);
+  EXPECT_GT(group[1]["max_theta_degrees"], 30);
   EXPECT_EQ(record_of("out/left.png")["views"][0]["max_theta_degrees"], 180);
 }
 
