@@ -69,7 +69,8 @@ class Device {
   Device& operator=(Device&&) noexcept;
 
   const DeviceInfo& info() const;
-  /// What `auto` passed over and why, for the user; empty if nothing.
+  /// For the user: which devices at least as good `auto`, `cuda` or `vulkan` passed over, as they
+  /// cannot be used or did not open, and why; empty if none.
   const std::string& note() const;
   /// Messages of the validation layers so far (errors and warnings).
   std::vector<std::string> validation_messages() const;

@@ -7,7 +7,7 @@
 
 #include "cpu/cpu_device.h"
 #include "cuda/cuda_device.h"
-#include "matching/backend.h"
+#include "matching/open_first.h"
 #include "text/lower_case.h"
 #include "vulkan/vulkan_device.h"
 #include "widestereo/error.h"
@@ -27,14 +27,26 @@ constexpr std::array<Api, 2> apis = {
     {{DeviceKind::cuda, "cuda", "CUDA", list_cuda_devices, open_cuda_device},
      {DeviceKind::vulkan, "vulkan", "Vulkan", list_vulkan_devices, open_vulkan_device}}};
 
-/// Lower is better: GPUs before software devices, CUDA before Vulkan.
+/// Lower is better, usable or not: GPUs before software devices, CUDA before Vulkan.
 int rank(const DeviceInfo& info) {
-  if (!info.unusable.empty()) return 9;
   const int not_cuda = info.kind == DeviceKind::cuda ? 0 : 3;
-  if (info.type == "discrete gpu") return not_cuda;
   if (info.type == "integrated gpu") return not_cuda + 1;
   if (info.type == "virtual gpu") return not_cuda + 2;
+  // CUDA devices whose properties cannot be read have no type.
+  if (info.type == "discrete gpu" || info.kind == DeviceKind::cuda) return not_cuda;
   return info.kind == DeviceKind::cpu ? 7 : 6;
+}
+
+template <class Place>
+void sort_by(std::vector<DeviceInfo>& devices, Place place) {
+  std::stable_sort(devices.begin(), devices.end(),
+                   [place](const auto& a, const auto& b) { return place(a) < place(b); });
+}
+
+/// Best first, then those that cannot be used.
+void sort_usable_first(std::vector<DeviceInfo>& devices) {
+  sort_by(devices,
+          [](const DeviceInfo& info) { return std::pair(!info.unusable.empty(), rank(info)); });
 }
 
 std::string names_of(const std::vector<DeviceInfo>& devices) {
@@ -78,24 +90,6 @@ std::unique_ptr<Device::Implementation> open_listed(const DeviceInfo& device,
   return open_cpu_device();
 }
 
-/// The first usable one that opens, as another process may have taken it; null where none does.
-/// `passed_over`: sentences about those before it, a space after each, which it is noted with.
-std::unique_ptr<Device::Implementation> open_first(const std::vector<DeviceInfo>& devices,
-                                                   const DeviceRequest& request,
-                                                   std::string& passed_over) {
-  for (const DeviceInfo& device : devices) {
-    if (!device.unusable.empty()) continue;
-    try {
-      auto implementation = open_listed(device, request);
-      implementation->note = passed_over;
-      return implementation;
-    } catch (const Error& error) {
-      passed_over += device.name + ": " + error.what() + " ";
-    }
-  }
-  return nullptr;
-}
-
 std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std::string& wanted,
                                                       const DeviceRequest& request) {
   const std::string name = api.name;
@@ -104,8 +98,7 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
   if (devices.empty()) {
     throw Error("No " + name + " device: " + why_none + " Or choose the device \"cpu\".");
   }
-  std::stable_sort(devices.begin(), devices.end(),
-                   [](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  sort_usable_first(devices);
   if (wanted.empty() && devices.front().unusable.empty()) {
     std::string passed_over;
     auto implementation = open_first(devices, request, passed_over);
@@ -123,41 +116,47 @@ std::unique_ptr<Device::Implementation> open_matching(const Api& api, const std:
   return open_listed(*device, request);
 }
 
-/// Which CUDA devices cannot be used and why. Someone without an NVIDIA driver need not read of
-/// CUDA.
-std::string unusable_cuda_devices() {
-  if (!cuda_driver_found()) return "";
-  std::string why;
-  const std::vector<DeviceInfo> devices = list_cuda_devices(&why);
-  if (devices.empty()) return "No CUDA device: " + why + " ";
-  std::string unusable;
-  for (const DeviceInfo& device : devices) {
-    if (!device.unusable.empty()) unusable += device.name + ": " + device.unusable + " ";
-  }
-  return unusable;
+/// Why there is no device of this kind, a space after it; empty if there is one.
+std::string note_of_none(const Api& api) {
+  const std::string why = Device::why_none(api.kind);
+  return why.empty() ? "" : std::string("No ") + api.name + " device: " + why + " ";
 }
 
 std::unique_ptr<Device::Implementation> open_best(const DeviceRequest& request) {
-  std::string passed_over = unusable_cuda_devices();
+  const auto& [cuda, vulkan] = apis;
+  // Someone without an NVIDIA driver need not read of CUDA.
+  std::string passed_over = cuda_driver_found() ? note_of_none(cuda) : "";
   std::vector<DeviceInfo> devices = Device::list();
   std::erase_if(devices, [](const DeviceInfo& device) { return device.kind == DeviceKind::cpu; });
   auto implementation = open_first(devices, request, passed_over);
   if (implementation != nullptr) return implementation;
-  bool any_vulkan = false;
-  for (const DeviceInfo& device : devices) {
-    if (device.kind != DeviceKind::vulkan) continue;
-    any_vulkan = true;
-    if (!device.unusable.empty()) passed_over += device.name + ": " + device.unusable + " ";
-  }
-  if (!any_vulkan) {
-    passed_over += "No Vulkan device: " + Device::why_none(DeviceKind::vulkan) + " ";
-  }
   implementation = open_cpu_device();
-  implementation->note = passed_over + "Using the CPU.";
+  implementation->note = passed_over + note_of_none(vulkan) + "Using the CPU.";
   return implementation;
 }
 
 }  // namespace
+
+std::unique_ptr<Device::Implementation> open_first(std::vector<DeviceInfo> devices,
+                                                   const DeviceRequest& request,
+                                                   std::string& passed_over) {
+  sort_by(devices,
+          [](const DeviceInfo& info) { return std::pair(rank(info), info.unusable.empty()); });
+  for (const DeviceInfo& device : devices) {
+    std::string why = device.unusable;
+    try {
+      if (why.empty()) {
+        auto implementation = open_listed(device, request);
+        implementation->note = passed_over;
+        return implementation;
+      }
+    } catch (const Error& error) {
+      why = error.what();
+    }
+    passed_over += device.name + ": " + why + " ";
+  }
+  return nullptr;
+}
 
 Device::Device(std::unique_ptr<Implementation> implementation)
     : implementation_(std::move(implementation)) {}
@@ -194,8 +193,7 @@ std::vector<DeviceInfo> Device::list() {
     for (DeviceInfo& device : api.list(nullptr)) devices.push_back(std::move(device));
   }
   devices.push_back(cpu_device_info());
-  std::stable_sort(devices.begin(), devices.end(),
-                   [](const auto& a, const auto& b) { return rank(a) < rank(b); });
+  sort_usable_first(devices);
   return devices;
 }
 
