@@ -8,6 +8,12 @@
 namespace widestereo {
 namespace {
 
+[[noreturn]] void refuse_old_instance() {
+  throw Error(
+      "The Vulkan instance was made for Vulkan 1.0; set VkApplicationInfo::apiVersion to "
+      "VK_API_VERSION_1_1 or newer.");
+}
+
 /// The handles of an application, none of which may be missing.
 const VulkanHandles& complete(const VulkanHandles& handles) {
   const auto require = [](bool given, const std::string& name) {
@@ -19,6 +25,11 @@ const VulkanHandles& complete(const VulkanHandles& handles) {
   require(handles.physical_device != VK_NULL_HANDLE, "physical_device");
   require(handles.device != VK_NULL_HANDLE, "device");
   require(handles.queue != VK_NULL_HANDLE, "queue");
+  // Drivers themselves have no such function for an instance of Vulkan 1.0.
+  if (handles.get_instance_proc_addr(handles.instance, "vkGetPhysicalDeviceProperties2") ==
+      nullptr) {
+    refuse_old_instance();
+  }
   return handles;
 }
 
@@ -42,6 +53,8 @@ VulkanContext::VulkanContext(const VulkanHandles& adopted)
       instance_functions_(
           InstanceFunctions::load(adopted.get_instance_proc_addr, adopted.instance)) {
   require_usable();
+  // The loader's function leaves out what is newer than Vulkan 1.0 then; every device has a limit.
+  if (largest_allocation_ == 0) refuse_old_instance();
   const std::string why =
       why_no_compute(instance_functions_, handles_.physical_device, handles_.queue_family);
   if (!why.empty()) throw Error("The Vulkan device " + name() + " " + why);

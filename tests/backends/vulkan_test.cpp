@@ -17,6 +17,7 @@
 #include "match_fixture.h"
 #include "same_bits.h"
 #include "vulkan/physical_device.h"
+#include "vulkan/result.h"
 #include "vulkan/submission.h"
 #include "vulkan/vulkan_backend.h"
 #include "vulkan_fixture.h"
@@ -354,6 +355,52 @@ TEST(VulkanContexts, RefuseHandlesThatDoNotDo) {
   EXPECT_EQ(error(handles), "");
   handles.queue_family = 1;
   EXPECT_THAT(error(handles), HasSubstr("cannot compute"));
+}
+
+/// As of an application that gives no VkApplicationInfo.
+class InstanceOfVulkan10 {
+ public:
+  explicit InstanceOfVulkan10(PFN_vkGetInstanceProcAddr get) {
+    const auto create =
+        reinterpret_cast<PFN_vkCreateInstance>(get(VK_NULL_HANDLE, "vkCreateInstance"));
+    VkInstanceCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+    check(create(&info, nullptr, &instance_), "The Vulkan loader", "make an instance");
+    destroy_ = reinterpret_cast<PFN_vkDestroyInstance>(get(instance_, "vkDestroyInstance"));
+    const auto enumerate = reinterpret_cast<PFN_vkEnumeratePhysicalDevices>(
+        get(instance_, "vkEnumeratePhysicalDevices"));
+    std::uint32_t count = 1;
+    enumerate(instance_, &count, &first_device_);
+  }
+  ~InstanceOfVulkan10() { destroy_(instance_, nullptr); }
+  InstanceOfVulkan10(const InstanceOfVulkan10&) = delete;
+  InstanceOfVulkan10& operator=(const InstanceOfVulkan10&) = delete;
+
+  VkInstance handle() const { return instance_; }
+  VkPhysicalDevice first_device() const { return first_device_; }
+
+ private:
+  VkInstance instance_ = VK_NULL_HANDLE;
+  VkPhysicalDevice first_device_ = VK_NULL_HANDLE;
+  PFN_vkDestroyInstance destroy_ = nullptr;
+};
+
+TEST(VulkanContexts, RefuseInstancesOfVulkan10) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const Application application;
+  const InstanceOfVulkan10 old(application.loader.get_instance_proc_addr());
+  VulkanHandles handles = application.context.handles();
+  const auto error = [&handles] { return error_of([&] { const VulkanContext adopted(handles); }); };
+  handles.instance = old.handle();
+  handles.physical_device = old.first_device();
+  EXPECT_THAT(error(), HasSubstr("set VkApplicationInfo::apiVersion"));
+
+  // As without a loader.
+  handles = application.context.handles();
+  handles.get_instance_proc_addr = FaultyLoader::get_instance_proc_addr();
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults().missing_function = "vkGetPhysicalDeviceProperties2";
+  EXPECT_THAT(error(), HasSubstr("set VkApplicationInfo::apiVersion"));
 }
 
 TEST(VulkanQueues, AreThoseThatTellTimeThenThoseThatDoNotDraw) {
