@@ -71,6 +71,8 @@ class CudaMatcher {
   void enqueue_next(std::span<const CudaImage> images, std::span<const CudaViewMaps> maps,
                     CUstream_st* stream, const CudaWarmStart& start = {});
 
+  /// That is used, as VulkanMatcher::filter().
+  Filter filter() const;
   std::size_t device_bytes() const;
 
  private:

@@ -47,7 +47,8 @@ enum class Filter : int {
   device = 1,  ///< by the texture units of a GPU, in a fraction of the instructions; their
                ///< positions are rounded, to 1/256 pixel on most (cubic: 1/512), and pixels have
                ///< half precision, where a Vulkan device can write that. Exact on CPUs and on
-               ///< Vulkan devices that cannot filter floats (StereoResult::filter says which)
+               ///< Vulkan devices that cannot filter floats (StereoResult::filter and
+               ///< VulkanMatcher::filter() say which)
 };
 
 /// How planes are found.

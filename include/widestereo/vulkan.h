@@ -40,6 +40,7 @@ struct VulkanHandles {
   std::uint32_t queue_family = 0;
   /// The device was made with the feature shaderStorageImageExtendedFormats. Texture units then
   /// filter half precision, in fewer cycles; a Matcher does so where the feature is offered.
+  /// Left false, devices that cannot filter 32-bit floats filter exactly (VulkanMatcher::filter()).
   bool extended_storage_formats = false;
 };
 
@@ -143,6 +144,8 @@ class VulkanMatcher {
   void record_next(std::span<const VkCommandBuffer> commands, const VulkanBindings& bindings,
                    const WarmStart& start = {});
 
+  /// That is used: Options::filter where the device has it, as handed in.
+  Filter filter() const;
   std::size_t device_bytes() const;
 
  private:

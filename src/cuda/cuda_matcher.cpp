@@ -88,6 +88,7 @@ class CudaMatcher::Implementation {
     enqueue_prepared(warm_, images, maps, stream, captured);
   }
 
+  Filter filter() const { return setup_.filter(); }
   std::size_t device_bytes() const { return backend_.device_bytes(); }
 
  private:
@@ -167,6 +168,7 @@ void CudaMatcher::enqueue_next(std::span<const CudaImage> images,
                                const CudaWarmStart& start) {
   implementation_->enqueue_next(images, maps, stream, start);
 }
+Filter CudaMatcher::filter() const { return implementation_->filter(); }
 std::size_t CudaMatcher::device_bytes() const { return implementation_->device_bytes(); }
 
 }  // namespace widestereo

@@ -35,6 +35,7 @@ void CudaMatcher::enqueue(std::span<const CudaImage>, std::span<const CudaViewMa
 }
 void CudaMatcher::enqueue_next(std::span<const CudaImage>, std::span<const CudaViewMaps>,
                                CUstream_st*, const CudaWarmStart&) {}
+Filter CudaMatcher::filter() const { return Filter::exact; }
 std::size_t CudaMatcher::device_bytes() const { return 0; }
 
 }  // namespace widestereo

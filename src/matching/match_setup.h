@@ -16,6 +16,8 @@ struct MatchSetup {
   MatchSetup(const Rig& rig, const Options& options, const DeviceInfo& device);
   /// Hands all viewing rays to the back end; returns those of the rig's views, CV_32FC4.
   std::vector<cv::Mat> set_rays(Backend& backend) const;
+  /// That is used: Options::filter where the device has it.
+  Filter filter() const { return static_cast<Filter>(schedule.constants.filter); }
 
   Schedule schedule;       ///< of a frame by itself
   Schedule warm_schedule;  ///< of one that starts from the previous one; set_motion() completes it

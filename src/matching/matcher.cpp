@@ -181,7 +181,7 @@ class Matcher::Implementation {
     add_work(result.times, schedule);
     result.device_milliseconds = backend_->device_milliseconds();
     result.device_bytes = backend_->device_bytes();
-    result.filter = static_cast<Filter>(schedule.constants.filter);
+    result.filter = setup_.filter();
     result.levels = static_cast<int>(schedule.views.size() / images.size());
     result.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();

@@ -115,6 +115,7 @@ class VulkanMatcher::Implementation {
     record(commands, bindings, setup_.warm_schedule);
   }
 
+  Filter filter() const { return setup_.filter(); }
   std::size_t device_bytes() const { return backend_.device_bytes(); }
 
  private:
@@ -204,6 +205,7 @@ void VulkanMatcher::record_next(Commands commands, const VulkanBindings& binding
                                 const WarmStart& start) {
   implementation_->record_next(commands, *bindings.implementation_, start);
 }
+Filter VulkanMatcher::filter() const { return implementation_->filter(); }
 std::size_t VulkanMatcher::device_bytes() const { return implementation_->device_bytes(); }
 
 }  // namespace widestereo

@@ -207,6 +207,7 @@ TEST_P(CudaApplication, GetsTheMatchersResultOnItsOwnStream) {
     const StereoResult expected = Matcher(*device, pair.rig, options).match(images);
     for (const int ordinal : {CudaMatcher::current_device, 0}) {
       CudaMatcher matcher(pair.rig, options, ordinal);
+      EXPECT_EQ(matcher.filter(), expected.filter);
       const DeviceMaps first(size);
       const DeviceMaps second(size);
       const CudaViewMaps outputs[] = {first.maps(), second.maps()};

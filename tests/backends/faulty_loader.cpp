@@ -90,7 +90,8 @@ VKAPI_ATTR void VKAPI_CALL formats(VkPhysicalDevice device, VkFormat format,
   *properties = {};
   if (faults().no_formats) return;
   real_formats(device, format, properties);
-  if (faults().no_filtering) {
+  if (faults().no_filtering ||
+      (faults().no_filtering_of_floats && format == VK_FORMAT_R32_SFLOAT)) {
     properties->optimalTilingFeatures &=
         ~static_cast<VkFormatFeatureFlags>(VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
   }

@@ -105,6 +105,7 @@ struct Faults {
   bool no_layers = false;
   bool no_formats = false;
   bool no_filtering = false;                      ///< images of no format can be filtered
+  bool no_filtering_of_floats = false;            ///< likewise of 32 bits
   std::optional<VkPhysicalDeviceType> type = {};  ///< what the device says it is
   /// Instead of the device's own, if any.
   std::vector<VkQueueFamilyProperties> queue_families = {};

@@ -596,6 +596,23 @@ TEST(VulkanApplications, OfGpusGetTheMatchersResultToo) {
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
+TEST(VulkanApplications, CanTellWhichFilterIsUsed) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  FaultyLoader::faults() = {.no_filtering_of_floats = true,
+                            .type = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU};
+  Application application;
+  VulkanHandles handles = application.context.handles();
+  handles.get_instance_proc_addr = FaultyLoader::get_instance_proc_addr();
+  const Rig rig = render_demo(side).rig;
+  const auto filter = [&] { return VulkanMatcher(handles, rig, small_options("fast")).filter(); };
+  ASSERT_TRUE(handles.extended_storage_formats) << "which Vulkan's profiles ask for";
+  EXPECT_EQ(filter(), Filter::device);
+  handles.extended_storage_formats = false;
+  EXPECT_EQ(filter(), Filter::exact);
+  EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
+}
+
 TEST(VulkanApplications, MayGiveOneMatchToSeveralCommandBuffers) {
   REQUIRE_VULKAN_OR_SKIP();
   DemoInApplication demo;
