@@ -31,8 +31,10 @@ FN float intensity_or_masked(float value) {
   return bits < float_as_uint(ABOVE_INTENSITY) || bits == SIGN_BIT ? value : MASKED_INTENSITY;
 }
 
-// Rec. 601, as OpenCV makes grey of colours.
-FN float luma(float red, float green, float blue) { return 0.299f * red + 0.587f * green + 0.114f * blue; }
+// Rec. 601, as OpenCV makes grey of colours; of grey, that very grey.
+FN float luma(float red, float green, float blue) {
+  return green + 0.299f * (red - green) + 0.114f * (blue - green);
+}
 
 // Distance along the unit ray of the plane (m, cost) at a pixel, 0 where it holds none.
 FN float plane_distance(vec4 hypothesis, vec4 ray) {

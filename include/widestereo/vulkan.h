@@ -99,7 +99,10 @@ class VulkanBindings {
 
 /// Matches images of one rig in an application's command buffers. Not thread-safe; frames of one
 /// matcher must follow each other on one queue. Results equal a Matcher's on the same device whose
-/// Options::max_gain is 1, with VulkanHandles::extended_storage_formats or Filter::exact.
+/// Options::max_gain is 1, with VulkanHandles::extended_storage_formats or Filter::exact. Of
+/// textures, only grey ones of floats do so to the last bit: devices may round what they make of
+/// whole numbers, and colours keep the fractions of grey levels that a Matcher's images of whole
+/// numbers lose.
 class VulkanMatcher {
  public:
   /// Allocates all memory, compiles the kernels, submits to the queue and waits for it.

@@ -116,6 +116,16 @@ TEST(CudaMaps, IntensitiesEqualTheMatchersBitByBit) {
   EXPECT_GT(ABOVE_INTENSITY, 1.0f);
 }
 
+TEST(TextureColours, OfGreyKeepItsBits) {
+  for (int i = 0; i < 65536; ++i) {
+    const float grey = static_cast<float>(i) * SCALE_OF_16_BITS;
+    ASSERT_EQ(kernel::luma(grey, grey, grey), grey);
+  }
+  EXPECT_NEAR(kernel::luma(1, 0, 0), 0.299, 1e-6);
+  EXPECT_NEAR(kernel::luma(0, 1, 0), 0.587, 1e-6);
+  EXPECT_NEAR(kernel::luma(0, 0, 1), 0.114, 1e-6);
+}
+
 TEST(CudaMaps, DistancesAndNormalsOfPlanes) {
   const Eigen::Vector3d normal = Eigen::Vector3d(0.3, -0.4, -1).normalized();
   const Eigen::Vector3d ray = Eigen::Vector3d(0.1, 0.5, 0.7).normalized();
