@@ -29,8 +29,7 @@ namespace widestereo {
 /// What an application hands in to have matching done on its own device. The instance (its
 /// apiVersion) and the device must be of Vulkan 1.1 or newer and the queue family must compute; no
 /// feature or extension needs to be enabled, though one makes it faster. Nothing handed in is ever
-/// destroyed. Vulkan requires that nobody else, another matcher in another thread included, uses
-/// `queue` during a call that submits.
+/// destroyed. Only VulkanMatcher's constructor uses `queue`.
 struct VulkanHandles {
   PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
   VkInstance instance = VK_NULL_HANDLE;
@@ -105,7 +104,10 @@ class VulkanBindings {
 /// numbers lose.
 class VulkanMatcher {
  public:
-  /// Allocates all memory, compiles the kernels, submits to the queue and waits for it.
+  /// Allocates all memory, compiles the kernels, then submits to the queue and waits for it. Vulkan
+  /// requires that nobody else, another matcher in another thread included, uses the queue
+  /// meanwhile: a lock must cover the whole call, most of which is compilation. Where others cannot
+  /// wait, hand in another queue of the family; what is recorded may run on any of them.
   /// `pipeline_cache`: a file that keeps compiled kernels between runs; empty for none. Throws
   /// Error when the rig, the options or the device do not do, or that file cannot be written.
   VulkanMatcher(const VulkanHandles& handles, const Rig& rig, const Options& options,

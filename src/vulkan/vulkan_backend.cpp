@@ -89,7 +89,6 @@ VulkanBackend::VulkanBackend(const VulkanContext& context, const std::vector<cv:
     submission =
         std::make_unique<Submission>(context, command_pool_.get(), max_bands_per_submission + 1);
   }
-  start_memory();
 }
 
 VulkanBackend::~VulkanBackend() = default;
@@ -236,6 +235,12 @@ void VulkanBackend::start_memory() {
   context_.vk().vkCmdUpdateBuffer(commands, places_.handle.get(), 0, sizeof block, &block);
   submissions_[0]->submit();
   submissions_[0]->wait();
+  memory_started_ = true;
+}
+
+VkCommandBuffer VulkanBackend::begin_transfer() {
+  if (!memory_started_) start_memory();
+  return submissions_[0]->begin();
 }
 
 void VulkanBackend::transition(VkCommandBuffer commands, const LayeredImage& image,
@@ -293,7 +298,7 @@ VkDeviceSize VulkanBackend::map_bytes(int view) const {
 void VulkanBackend::upload(const MapBuffer& map, int view, const cv::Mat& values) {
   stage(view, values, CV_32FC4);
   const VkBufferCopy all = {0, first_byte_of_map(view), map_bytes(view)};
-  const VkCommandBuffer commands = submissions_[0]->begin();
+  const VkCommandBuffer commands = begin_transfer();
   context_.vk().vkCmdCopyBuffer(commands, staging_.handle.get(), map.buffer.handle.get(), 1, &all);
   submissions_[0]->submit();
   submissions_[0]->wait();
@@ -303,7 +308,7 @@ cv::Mat VulkanBackend::download(const MapBuffer& map, int view) {
   const cv::Size size = sizes_.at(static_cast<std::size_t>(view));
   const VkBufferCopy all = {first_byte_of_map(view), 0, map_bytes(view)};
   const Buffer& received = staging();
-  const VkCommandBuffer commands = submissions_[0]->begin();
+  const VkCommandBuffer commands = begin_transfer();
   barrier(commands, compute_and_transfer, VK_PIPELINE_STAGE_TRANSFER_BIT,
           VK_ACCESS_TRANSFER_READ_BIT);
   context_.vk().vkCmdCopyBuffer(commands, map.buffer.handle.get(), received.handle.get(), 1, &all);
@@ -325,7 +330,7 @@ void VulkanBackend::set_intensity(int view, const cv::Mat& intensity) {
                     static_cast<VkDeviceSize>(place.first + y * place.stride) * sizeof(float),
                     row});
   }
-  const VkCommandBuffer commands = submissions_[0]->begin();
+  const VkCommandBuffer commands = begin_transfer();
   context_.vk().vkCmdCopyBuffer(commands, staging_.handle.get(), intensities_.buffer.handle.get(),
                                 static_cast<std::uint32_t>(rows.size()), rows.data());
   submissions_[0]->submit();

@@ -26,8 +26,8 @@ struct VulkanTuning {
 };
 
 /// Memory and kernels for matches of fixed sizes on a Vulkan device. Not thread-safe; the context
-/// must outlive it. Everything but record_…() submits to the context's queue and waits for its
-/// own fence.
+/// must outlive it. Everything but the constructor, compile() and record_…() submits to the
+/// context's queue and waits for its own fence.
 class VulkanBackend final : public Backend {
  public:
   /// Throws Error naming the device and the memory, limit or feature that it lacks.
@@ -83,7 +83,10 @@ class VulkanBackend final : public Backend {
   void make_buffers(const VulkanContext& context);
   void make_descriptor_sets();
   VkDescriptorSet make_descriptor_set(const LayeredImage& texels_of_level);
+  /// Fills memory before anything is transferred, and not before: an application's queue is left
+  /// alone while kernels are compiled.
   void start_memory();
+  VkCommandBuffer begin_transfer();
   void transition(VkCommandBuffer commands, const LayeredImage& image,
                   const VkImageSubresourceRange& layers, VkImageLayout from,
                   VkImageLayout to) const;
@@ -124,6 +127,7 @@ class VulkanBackend final : public Backend {
   Handle<VkCommandPool> command_pool_;
   std::array<std::unique_ptr<Submission>, 2> submissions_;  // one is recorded while the other runs
   KernelTimes times_;
+  bool memory_started_ = false;
   bool time_each_ = true;
   double milliseconds_ = 0;  // of the last run
 };

@@ -607,6 +607,24 @@ TEST(VulkanApplications, OfGpusGetTheMatchersResultToo) {
   EXPECT_THAT(application.instance.validation_messages(), IsEmpty());
 }
 
+TEST(VulkanApplications, KeepTheirQueueUntilAllIsCompiled) {
+  REQUIRE_VULKAN_OR_SKIP();
+  const FaultyLoader::Scope scope;
+  const Application application(false);
+  VulkanHandles handles = application.context.handles();
+  handles.get_instance_proc_addr = FaultyLoader::get_instance_proc_addr();
+  const Rig rig = render_demo(side).rig;
+  const auto compiled = [&](int failing_submission) {
+    FaultyLoader::faults() = {.failing_submission = failing_submission};
+    const std::string error = error_of([&] { VulkanMatcher(handles, rig, small_options("fast")); });
+    EXPECT_EQ(error.empty(), failing_submission < 0) << error;
+    return FaultyLoader::faults().calls["vkCreateComputePipelines"];
+  };
+  const int all = compiled(-1);
+  EXPECT_GT(all, 10);
+  EXPECT_EQ(compiled(0), all);
+}
+
 TEST(VulkanApplications, CanTellWhichFilterIsUsed) {
   REQUIRE_VULKAN_OR_SKIP();
   const FaultyLoader::Scope scope;
