@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "calibration_fit.h"
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -13,14 +14,51 @@ namespace ws = widestereo;
 
 namespace {
 
-/// What refining the rig would leave; nothing where the matches do not tell.
-std::optional<ws::EpipolarReport> after_refinement(const ws::Rig& rig,
-                                                   const std::vector<ws::PixelMatch>& matches) {
+/// Nothing where there are too few to tell.
+std::optional<ws::EpipolarReport> report_of(const MatchedViews& pair) {
+  constexpr int fewest = 50;
   try {
-    return ws::refine_rig(rig, {{0, 1, matches}}).after.front();
+    const ws::EpipolarReport report = check_epipolar(pair.first, pair.second, pair.matches);
+    if (report.matches >= fewest) return report;
+  } catch (const ws::Error&) {
+    // hardly any, or the cameras share a centre, which matching will refuse
+  }
+  return std::nullopt;
+}
+
+/// The median error that refining would leave; nothing where the matches do not tell.
+std::optional<double> after_refinement(const MatchedViews& pair) {
+  try {
+    const ws::Rig rig{.views = {pair.first, pair.second}};
+    return ws::refine_rig(rig, {{0, 1, pair.matches}}).after.front().median_pixels;
   } catch (const ws::Error&) {
     return std::nullopt;
   }
+}
+
+/// A pair whose calibration or poses are not right.
+struct Misfit {
+  const MatchedViews* pair = nullptr;
+  double median_pixels = 0;
+  std::optional<double> refined;  ///< where the error can be refined away
+
+  bool is_worse_than(const Misfit& other) const {
+    if (refined.has_value() != other.refined.has_value()) return !refined;
+    return median_pixels > other.median_pixels;
+  }
+};
+
+std::optional<Misfit> misfit_of(const MatchedViews& pair, const ws::EpipolarReport& report) {
+  // Of pairs at hand whose calibration is right or nearly so 0.74 or more is left of the error, of
+  // those turned by a quarter of a pixel half of it.
+  constexpr double much_less = 0.65;
+  constexpr double felt = 0.1;  // pixels
+  const double now = report.median_pixels;
+  const std::optional<double> better = after_refinement(pair);
+  if (better && *better < much_less * now && now - *better > felt)
+    return Misfit{&pair, now, better};
+  if (will_do(report)) return std::nullopt;
+  return Misfit{&pair, now, std::nullopt};
 }
 
 }  // namespace
@@ -30,30 +68,33 @@ bool will_do(const ws::EpipolarReport& report) {
   return !lie_behind(report) && report.median_pixels < usable;
 }
 
-void report_calibration_errors(const ws::Rig& rig, const std::vector<ws::PixelMatch>& matches,
-                               bool has_poses) {
-  constexpr int fewest = 50;
-  // Of pairs at hand whose calibration is right or nearly so 0.74 or more is left of the error, of
-  // those turned by a quarter of a pixel half of it.
-  constexpr double much_less = 0.65;
-  constexpr double felt = 0.1;  // pixels
-  if (rig.views.size() != 2) return;
-  ws::EpipolarReport report;
-  try {
-    report = check_epipolar(rig.views[0], rig.views[1], matches);
-  } catch (const ws::Error&) {
-    return;  // hardly any, or the cameras share a centre, which matching will refuse
+void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_poses) {
+  constexpr std::size_t one_in = 4;
+  std::size_t told = 0;
+  std::vector<Misfit> misfits;
+  for (const MatchedViews& pair : pairs) {
+    const auto report = report_of(pair);
+    if (!report) continue;
+    ++told;
+    if (const auto misfit = misfit_of(pair, *report)) misfits.push_back(*misfit);
   }
-  if (report.matches < fewest) return;
-  const auto better = after_refinement(rig, matches);
-  const double now = report.median_pixels;
-  if (better && better->median_pixels < much_less * now && now - better->median_pixels > felt) {
-    say(ws::formatted("The features of the images lie %.2f px off their epipolar curves (median), "
-                      "and would lie %.2f px off if the calibration said how the cameras stand; ",
-                      now, better->median_pixels) +
+  if (misfits.empty() || one_in * misfits.size() < told) return;
+  const Misfit& worst =
+      *std::min_element(misfits.begin(), misfits.end(),
+                        [](const Misfit& a, const Misfit& b) { return a.is_worse_than(b); });
+  const std::string subject =
+      pairs.size() == 1 ? "The features of the images"
+                        : "The features of " + worst.pair->first.name + " and " +
+                              worst.pair->second.name + " (" + std::to_string(misfits.size()) +
+                              " of " + std::to_string(told) + " pairs are like this)";
+  if (worst.refined) {
+    say(subject +
+        ws::formatted(" lie %.2f px off their epipolar curves (median), and would lie %.2f px off "
+                      "if the calibration said how the cameras stand; ",
+                      worst.median_pixels, *worst.refined) +
         (has_poses ? "get better poses." : "mend it by `widestereo calibration refine`."));
-  } else if (!will_do(report)) {
-    say("The features of the images do not fit the calibration; see `widestereo calibration "
-        "check`.");
+  } else {
+    say(subject + " do not fit " + (has_poses ? "the poses, or " : "") +
+        "the calibration; see `widestereo calibration check`.");
   }
 }

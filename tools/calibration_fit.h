@@ -4,14 +4,14 @@
 
 #include <vector>
 
+#include "image_checks.h"
 #include "widestereo/epipolar.h"
-#include "widestereo/rig.h"
 
 /// Whether the calibration will do for stereo.
 bool will_do(const widestereo::EpipolarReport& report);
 
-/// Says, on standard error, where the features of a pair fit its calibration much less than they
-/// would fit a better one: patches are looked for on epipolar curves alone. `has_poses`: the views
-/// stand as poses or a model say, not as cameras of a rig.
-void report_calibration_errors(const widestereo::Rig& rig,
-                               const std::vector<widestereo::PixelMatch>& matches, bool has_poses);
+/// Says, on standard error, where the features of pairs fit their calibration much less than they
+/// would fit a better one: patches are looked for on epipolar curves alone. Of many pairs some may
+/// hardly see the same, so that a few do not count. `has_poses`: the views stand as poses or a
+/// model say, not as cameras of a rig.
+void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_poses);

@@ -100,10 +100,10 @@ void run_depth(const DepthArguments& arguments) {
   const ws::Options options = settings.options();
   arguments.format.require_room_for(options.min_distance, options.max_distance);
 
-  const std::vector<ws::PixelMatch> features = features_of_pair(images);
-  const std::vector<double> blurs = arguments.sharpness.blurs(rig, images, features);
-  report_calibration_errors(rig, features, model || arguments.poses.given());
-  report_features_out_of_range(rig, features, options, calibrated.in_metres ? " m" : "");
+  const std::vector<MatchedViews> pairs = match_with_first(rig, images, options);
+  const std::vector<double> blurs = arguments.sharpness.blurs(rig, images, pairs);
+  report_calibration_errors(pairs, model || arguments.poses.given());
+  report_features_out_of_range(pairs, calibrated.in_metres ? " m" : "");
   const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);
   FolderContents contents{
       .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres, .blurs = blurs};

@@ -2,6 +2,7 @@
 #include "image_checks.h"
 
 #include <algorithm>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "text/formatted.h"
 #include "widestereo/error.h"
 #include "widestereo/image_io.h"
+#include "widestereo/rig_refinement.h"
 
 namespace ws = widestereo;
 
@@ -64,34 +66,68 @@ void report_blank_images(const ws::Rig& rig, const std::vector<cv::Mat>& images)
   }
 }
 
-std::vector<ws::PixelMatch> features_of_pair(const std::vector<cv::Mat>& images) {
-  if (images.size() != 2) return {};
-  return ws::match_features(images[0], images[1]);
+std::vector<MatchedViews> match_with_first(const ws::Rig& rig, const std::vector<cv::Mat>& images,
+                                           const ws::Options& options) {
+  std::vector<MatchedViews> pairs;
+  const ws::View& first = rig.views.front();
+  for (std::size_t i = 1; i < rig.views.size(); ++i) {
+    const ws::View& second = rig.views[i];
+    const bool are_matched = ws::has_baseline(first.world_from_camera.translation(),
+                                              second.world_from_camera.translation()) &&
+                             share_field_of_view(first, second, options);
+    if (!are_matched && rig.views.size() > 2) continue;
+    pairs.push_back({first,
+                     second,
+                     ws::match_features(images.front(), images[i]),
+                     {options.min_distance, options.max_distance}});
+  }
+  return pairs;
 }
 
-void report_features_out_of_range(const ws::Rig& rig, const std::vector<ws::PixelMatch>& matches,
-                                  const ws::Options& options, const std::string& unit) {
-  if (matches.empty()) return;
-  const ws::RangeReport range = ws::check_range(rig.views[0], rig.views[1], matches,
-                                                options.min_distance, options.max_distance);
+void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const std::string& unit) {
+  /// What lies beyond one end of the ranges.
+  struct Beyond {
+    int features = 0;
+    int most = 0;        // of one pair,
+    double limit = 0;    // where its range ends
+    double reached = 0;  // by 99 % of all
+  };
+  int matches = 0;
+  Beyond nearer{.reached = std::numeric_limits<double>::infinity()};
+  Beyond farther;
+  for (const MatchedViews& pair : pairs) {
+    if (pair.matches.empty()) continue;
+    const ws::RangeReport report = ws::check_range(pair.first, pair.second, pair.matches,
+                                                   pair.range.nearest, pair.range.farthest);
+    matches += report.matches;
+    const auto add = [](Beyond& beyond, int features, double limit) {
+      beyond.features += features;
+      if (features <= beyond.most) return;
+      beyond.most = features;
+      beyond.limit = limit;
+    };
+    add(nearer, report.nearer, pair.range.nearest);
+    add(farther, report.farther, pair.range.farthest);
+    if (report.nearest > 0) nearer.reached = std::min(nearer.reached, report.nearest);
+    farther.reached = std::max(farther.reached, report.farthest);
+  }
   // False matches are fewer: at most 0.5 % of any pair at hand whose range fits.
   constexpr double many = 0.01;
   constexpr int fewest = 5;
-  const auto report_if_many = [&](int outside, const char* where, const std::string& most,
+  const auto report_if_many = [&](const Beyond& beyond, const char* where, const std::string& most,
                                   const char* remedy) {
-    const double share = static_cast<double>(outside) / std::max(range.matches, 1);
-    if (outside < fewest || share < many) return;
-    say(ws::formatted("%.0f %% of the features that match lie ", 100 * share) + where + unit +
-        most + ", and nothing there can be found; give a " + remedy + " one.");
+    const double share = static_cast<double>(beyond.features) / std::max(matches, 1);
+    if (beyond.features < fewest || share < many) return;
+    say(ws::formatted("%.0f %% of the features that match lie ", 100 * share) +
+        ws::formatted(where, beyond.limit) + unit + most +
+        ", and nothing there can be found; give a " + remedy + " one.");
   };
   const auto most = [&](const char* words, double distance) {
     return ws::formatted(" (99 %% of all %s %.3g", words, distance) + unit + ")";
   };
-  report_if_many(
-      range.nearer, ws::formatted("nearer than --min-distance %g", options.min_distance).c_str(),
-      range.nearest < options.min_distance ? most("beyond", range.nearest) : "", "smaller");
-  report_if_many(
-      range.farther, ws::formatted("farther than --max-distance %g", options.max_distance).c_str(),
-      // Those of hardly any parallax have no distance.
-      range.farthest > options.max_distance ? most("within", range.farthest) : "", "larger");
+  report_if_many(nearer, "nearer than --min-distance %g",
+                 nearer.reached < nearer.limit ? most("beyond", nearer.reached) : "", "smaller");
+  report_if_many(farther, "farther than --max-distance %g",
+                 // Those of hardly any parallax have no distance.
+                 farther.reached > farther.limit ? most("within", farther.reached) : "", "larger");
 }

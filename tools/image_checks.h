@@ -9,6 +9,7 @@
 #include "widestereo/epipolar.h"
 #include "widestereo/options.h"
 #include "widestereo/rig.h"
+#include "widestereo/sfm_model.h"
 
 /// Whether an image shows nothing but noise where the mask, which may be empty, is not 0.
 bool is_blank(const cv::Mat& image, const cv::Mat& mask);
@@ -21,10 +22,18 @@ void require_different_pictures(const widestereo::Rig& rig, const std::vector<cv
 /// failed.
 void report_blank_images(const widestereo::Rig& rig, const std::vector<cv::Mat>& images);
 
-/// The features of a pair's images that match; none of more or fewer views.
-std::vector<widestereo::PixelMatch> features_of_pair(const std::vector<cv::Mat>& images);
-/// Says, on standard error, where many of a pair's features lie outside the range of distances,
+/// Two views that are matched with each other, and the features of their images that match.
+struct MatchedViews {
+  widestereo::View first, second;
+  std::vector<widestereo::PixelMatch> matches;
+  widestereo::DistanceRange range;  ///< in which distances are looked for
+};
+
+/// View 0 with each of the others that sees, within the range of distances and from another place,
+/// what it does; of two views always both.
+std::vector<MatchedViews> match_with_first(const widestereo::Rig& rig,
+                                           const std::vector<cv::Mat>& images,
+                                           const widestereo::Options& options);
+/// Says, on standard error, where many features of all pairs lie outside the range of distances,
 /// which the pixels there cannot tell: they match something else. `unit`: of lengths.
-void report_features_out_of_range(const widestereo::Rig& rig,
-                                  const std::vector<widestereo::PixelMatch>& matches,
-                                  const widestereo::Options& options, const std::string& unit);
+void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const std::string& unit);

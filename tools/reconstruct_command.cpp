@@ -8,10 +8,12 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "acceptance.h"
+#include "calibration_fit.h"
 #include "commands.h"
 #include "folder_format.h"
 #include "image_checks.h"
@@ -29,6 +31,7 @@
 #include "widestereo/error.h"
 #include "widestereo/fusion.h"
 #include "widestereo/image_io.h"
+#include "widestereo/rig_refinement.h"
 
 namespace ws = widestereo;
 namespace fs = std::filesystem;
@@ -212,6 +215,7 @@ class Reconstruction {
                                        [this](std::size_t image) { return is_matched(image); });
       if (!is_alone(groups_[i]) && !is_done) to_do.push_back(i);
     }
+    check_fit(to_do);
     ProgressBar bar("Matching on " + device_.info().name);
     for (std::size_t i = 0; i < to_do.size(); ++i) match(to_do[i], bar.part(i, to_do.size()));
     fuse();
@@ -286,6 +290,33 @@ class Reconstruction {
     if (kept.empty()) return;
     say("Kept as an earlier run matched them: " + std::to_string(kept.size()) + " of " +
         std::to_string(wanted.size() - alone_in(groups_)) + " images.");
+  }
+
+  /// A few pairs tell whether the calibration, the poses and the range fit, so that large scenes
+  /// take no longer.
+  void check_fit(const std::vector<std::size_t>& groups) const {
+    constexpr std::size_t count = 8;
+    std::set<std::pair<std::size_t, std::size_t>> taken;  // groups, and members besides the first
+    std::vector<MatchedViews> pairs;
+    ProgressBar bar("Comparing features");
+    for (std::size_t k = 0; k < count && !groups.empty(); ++k) {
+      bar.show(static_cast<double>(k) / count);
+      const std::size_t number = groups[k * groups.size() / count];
+      const Images& group = groups_[number];
+      const std::size_t other = 1 + k % (group.size() - 1);
+      const ws::Rig rig{.views = {images_.views[group[0]], images_.views[group[other]]}};
+      const ws::Options& options = options_[number];
+      // Not all of one frame's cameras see the same.
+      if (!taken.insert({number, other}).second ||
+          !share_field_of_view(rig.views[0], rig.views[1], options)) {
+        continue;
+      }
+      pairs.push_back(
+          match_with_first(rig, {images_.read(group[0]), images_.read(group[other])}, options)
+              .front());
+    }
+    report_calibration_errors(pairs, !images_.are_of_one_frame);
+    report_features_out_of_range(pairs, images_.in_metres ? " m" : "");
   }
 
   /// `progress`: empty where nobody sees it.

@@ -136,10 +136,11 @@ Selection select_frames(const SequenceArguments& a) {
   report_blank_images(selection.rig, first);
   // The first frame that shows anything decides alone, so that more frames may follow later.
   a.rig.leave_out_dark_rims(selection.rig, first);
-  const std::vector<ws::PixelMatch> features = features_of_pair(first);
-  selection.blurs = a.sharpness.blurs(selection.rig, first, features);
-  report_calibration_errors(selection.rig, features, false);
-  report_features_out_of_range(selection.rig, features, a.settings.options(), " m");
+  const std::vector<MatchedViews> pairs =
+      match_with_first(selection.rig, first, a.settings.options());
+  selection.blurs = a.sharpness.blurs(selection.rig, first, pairs);
+  report_calibration_errors(pairs, false);
+  report_features_out_of_range(pairs, " m");
   if (a.poses.given()) {
     selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen,
                                     a.frames.skip_incomplete);

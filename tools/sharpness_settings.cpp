@@ -30,7 +30,7 @@ void SharpnessSettings::add_to(CLI::App& command) {
 }
 
 std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig, const std::vector<cv::Mat>& images,
-                                             const std::vector<ws::PixelMatch>& matches) const {
+                                             const std::vector<MatchedViews>& pairs) const {
   const std::size_t count = rig.views.size();
   if (given_.size() > 1 && given_.size() != count) {
     throw ws::Error("--blur was given " + std::to_string(given_.size()) + " values for " +
@@ -47,8 +47,8 @@ std::vector<double> SharpnessSettings::blurs(const ws::Rig& rig, const std::vect
       return blurs;
     }
   }
-  const auto difference =
-      ws::compare_sharpness(rig.views[0], rig.views[1], images[0], images[1], matches);
+  const auto difference = ws::compare_sharpness(rig.views[0], rig.views[1], images[0], images[1],
+                                                pairs.front().matches);
   if (!difference) return blurs;
   const auto sharper = static_cast<std::size_t>(difference->sharper);
   blurs[sharper] = difference->blur;

@@ -6,7 +6,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "widestereo/epipolar.h"
+#include "image_checks.h"
 #include "widestereo/rig.h"
 
 class SharpnessSettings {
@@ -14,10 +14,9 @@ class SharpnessSettings {
   /// Adds --blur.
   void add_to(CLI::App& command);
   /// Standard deviations of the Gaussians that blur the views' images, pixels, as given or else
-  /// found, which is said; one image for each view, and the features that match where there are
-  /// two.
+  /// found, which is said; one image for each view, and of two views their pair.
   std::vector<double> blurs(const widestereo::Rig& rig, const std::vector<cv::Mat>& images,
-                            const std::vector<widestereo::PixelMatch>& matches) const;
+                            const std::vector<MatchedViews>& pairs) const;
 
  private:
   std::vector<double> given_;  ///< none, one for all views or one for each

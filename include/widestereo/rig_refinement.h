@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "widestereo/epipolar.h"
+#include "widestereo/options.h"
 #include "widestereo/rig.h"
 
 namespace widestereo {
@@ -38,9 +39,9 @@ struct RigRefinement {
   std::vector<std::string> left_out;          ///< why each pair did not count; empty where it did
 };
 
-/// Whether enough of what one view sees, in the range of distances of Options, is in the other one
+/// Whether enough of what one view sees, in the options' range of distances, is in the other one
 /// for features to be matched: more than 2 %.
-bool share_field_of_view(const View& first, const View& second);
+bool share_field_of_view(const View& first, const View& second, const Options& options = {});
 
 /// The rig that matches fit best, near the calibrated one: for cameras that have moved since they
 /// were calibrated, or were calibrated less well than their images allow. Refined are the rotations

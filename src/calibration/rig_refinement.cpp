@@ -429,12 +429,11 @@ void require_connected(const Rig& rig, const std::vector<ViewMatches>& pairs,
 
 }  // namespace
 
-bool share_field_of_view(const View& first, const View& second) {
+bool share_field_of_view(const View& first, const View& second, const Options& options) {
   std::array<int, 2> seen = {0, 0};
   int shared = 0;
-  const Options usual;
   for (const ObservedPoint& point :
-       assumed_points({first, second}, usual.min_distance, usual.max_distance)) {
+       assumed_points({first, second}, options.min_distance, options.max_distance)) {
     for (const std::size_t observer : point.observers) ++seen[observer];
     if (point.observers.size() == 2) ++shared;
   }

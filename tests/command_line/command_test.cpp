@@ -1203,13 +1203,14 @@ class TexturedPair : public Command {
     cv::imwrite(file("left.png"), noise.colRange(0, 96));
     cv::imwrite(file("right.png"), noise.colRange(shift, shift + 96));
   }
-  /// What matches the pair, and a sequence of it.
+  /// What matches the pair, a sequence of it and a scene of one frame.
   std::vector<std::string> matching_commands() const {
     for (const char* camera : {"cam0", "cam1"}) fs::create_directories(folder_ / camera);
     fs::copy(folder_ / "left.png", folder_ / "cam0" / "1.png");
     fs::copy(folder_ / "right.png", folder_ / "cam1" / "1.png");
     return {"depth " + file("left.png") + " " + file("right.png"),
-            "sequence " + folder_.path().string()};
+            "sequence " + folder_.path().string(),
+            "reconstruct " + folder_.path().string() + " --count 1"};
   }
   /// What a command prints, which ends well.
   std::string output_of(const std::string& command, const std::string& calibration,
@@ -1317,6 +1318,34 @@ TEST_F(TexturedPair, ErrorsOfTheCalibrationAreReported) {
   write_first_camera();
   EXPECT_THAT(output_of(commands.front(), "mono.yaml", "0.1 --poses " + file("poses.txt")),
               ContainsRegex(off + ".*; get better poses"));
+}
+
+/// By pairs that have a baseline, which are named.
+TEST_F(TexturedPair, PosesOfManyImagesAreChecked) {
+  write_images(0);  // as of what is far away
+  alter("right.png", 60);
+  write_first_camera();
+  std::string images;
+  fs::create_directories(folder_ / "cam0");
+  for (const std::string name : {"1.png", "2.png", "3.png"}) {
+    fs::copy(folder_ / "left.png", folder_ / "cam0" / name);
+    alter("cam0/" + name, 20 + name.front());
+    images += " " + file("cam0/" + name);
+  }
+  const std::string first_two = "1 0 0 0 0 0 0 1\n2 0.1 0 0 0 0 0 1\n";
+  folder_.write("right.txt", first_two + "3 0.2 0 0 0 0 0 1\n");
+  folder_.write("wrong.txt", first_two + "3 0.2 0 0 0.26 0 0 0.97\n");
+  for (const std::string& command :
+       {"depth" + images, "reconstruct " + folder_.path().string() + " --views 0"}) {
+    const auto output_with = [&](const std::string& poses) {
+      return output_of(command, "mono.yaml", "0.1 --poses " + file(poses));
+    };
+    EXPECT_THAT(output_with("right.txt"), Not(HasSubstr("features")));
+    EXPECT_THAT(output_with("wrong.txt"),
+                ContainsRegex("The features of [^ ]*1[^ ]* and [^ ]*3[^ ]* .1 of 2 pairs are like "
+                              "this. do not fit the poses, or the calibration; see "
+                              "`widestereo calibration check`"));
+  }
 }
 
 /// As of one camera on both channels.
