@@ -13,7 +13,6 @@
 #include "option_checks.h"
 #include "pose_settings.h"
 #include "rig_settings.h"
-#include "say.h"
 #include "text/formatted.h"
 #include "white_level.h"
 #include "widestereo/epipolar.h"
@@ -133,12 +132,7 @@ bool check(const CheckArguments& arguments) {
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
   const std::string verdict = verdict_of(r, first, second, matches, arguments.poses.given());
-  constexpr double longest_baseline = 5;  // metres, of what is usually mounted
-  const double length = baseline(first, second);
-  if (images.in_metres && !arguments.poses.given() && length > longest_baseline) {
-    say(ws::formatted("The baseline is %.4g m long; calibrations are in metres, is this one?",
-                      length));
-  }
+  if (images.in_metres && !arguments.poses.given()) report_long_baseline(images.rig);
   if (arguments.as_json) {
     // 0: there is none
     const auto distance = [](double value) {
@@ -154,7 +148,7 @@ bool check(const CheckArguments& arguments) {
                                          {"distance_p50", distance(r.typical)},
                                          {"distance_p95", distance(r.farthest)},
                                          {"first_sharper_by_pixels", blur},
-                                         {"baseline", length},
+                                         {"baseline", baseline(first, second)},
                                          {"verdict", verdict}})
                      .dump(2)
               << "\n";

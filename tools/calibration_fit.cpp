@@ -68,6 +68,18 @@ bool will_do(const ws::EpipolarReport& report) {
   return !lie_behind(report) && report.median_pixels < usable;
 }
 
+bool report_long_baseline(const ws::Rig& rig) {
+  constexpr double usual = 5;  // metres, at most
+  double longest = 0;
+  for (const ws::View& view : rig.views) {
+    for (const ws::View& other : rig.views) longest = std::max(longest, baseline(view, other));
+  }
+  if (longest <= usual) return false;
+  say(ws::formatted("The baseline is %.4g m long; calibrations are in metres, is this one?",
+                    longest));
+  return true;
+}
+
 void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_poses) {
   constexpr std::size_t one_in = 4;
   std::size_t told = 0;

@@ -6,9 +6,14 @@
 
 #include "image_checks.h"
 #include "widestereo/epipolar.h"
+#include "widestereo/rig.h"
 
 /// Whether the calibration will do for stereo.
 bool will_do(const widestereo::EpipolarReport& report);
+
+/// Asks, on standard error, whether lengths are in metres where cameras of one rig stand farther
+/// apart than any that are usually mounted. Whether they do.
+bool report_long_baseline(const widestereo::Rig& rig);
 
 /// Says, on standard error, where the features of pairs fit their calibration much less than they
 /// would fit a better one: patches are looked for on epipolar curves alone. Of many pairs some may

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calibration_commands.h"
+#include "calibration_fit.h"
 #include "calibration_output.h"
 #include "image_checks.h"
 #include "option_checks.h"
@@ -165,6 +166,7 @@ void refine(const RefineArguments& arguments) {
   require_other_file(arguments.output.file, read);
   ws::require_writable(arguments.output.file);
   arguments.output.require_form(rig);  // before the work of matching
+  report_long_baseline(rig);
   const std::vector<ws::ViewMatches> pairs =
       match_frames(rig, arguments.images, arguments.white_level);
   const ws::RigRefinement refined = ws::refine_rig(rig, pairs, arguments.intrinsics);

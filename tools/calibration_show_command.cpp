@@ -7,6 +7,7 @@
 #include <string>
 
 #include "calibration_commands.h"
+#include "calibration_fit.h"
 #include "geometry/angle.h"
 #include "rig_settings.h"
 #include "text/formatted.h"
@@ -125,6 +126,7 @@ std::string limit_of_lens(double max_theta_degrees) {
 void show(const ShowArguments& arguments) {
   const ws::Calibration calibration = ws::read_calibration(arguments.file);
   const std::vector<ws::View>& views = calibration.rig.views;
+  report_long_baseline(calibration.rig);
   nlohmann::ordered_json json = {{"file", arguments.file}, {"format", name_of(calibration.format)}};
   for (const ws::View& view : views) json["views"].push_back(describe(view));
   json["pairs"] = nlohmann::json::array();

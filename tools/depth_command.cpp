@@ -103,7 +103,9 @@ void run_depth(const DepthArguments& arguments) {
   const std::vector<MatchedViews> pairs = match_with_first(rig, images, options);
   const std::vector<double> blurs = arguments.sharpness.blurs(rig, images, pairs);
   report_calibration_errors(pairs, model || arguments.poses.given());
-  report_features_out_of_range(pairs, calibrated.in_metres ? " m" : "");
+  const bool is_unit_doubtful =
+      calibrated.in_metres && !arguments.poses.given() && report_long_baseline(rig);
+  report_features_out_of_range(pairs, calibrated.in_metres ? " m" : "", is_unit_doubtful);
   const MatchingRun run = match_images(settings, rig, blurred(images, blurs), arguments.output);
   FolderContents contents{
       .rig = rig, .images = images, .run = run, .in_metres = calibrated.in_metres, .blurs = blurs};

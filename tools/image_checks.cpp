@@ -84,7 +84,8 @@ std::vector<MatchedViews> match_with_first(const ws::Rig& rig, const std::vector
   return pairs;
 }
 
-void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const std::string& unit) {
+void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const std::string& unit,
+                                  bool is_unit_doubtful) {
   /// What lies beyond one end of the ranges.
   struct Beyond {
     int features = 0;
@@ -120,14 +121,16 @@ void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const 
     if (beyond.features < fewest || share < many) return;
     say(ws::formatted("%.0f %% of the features that match lie ", 100 * share) +
         ws::formatted(where, beyond.limit) + unit + most +
-        ", and nothing there can be found; give a " + remedy + " one.");
+        ", and nothing there can be found; give a " + remedy + ".");
   };
   const auto most = [&](const char* words, double distance) {
     return ws::formatted(" (99 %% of all %s %.3g", words, distance) + unit + ")";
   };
   report_if_many(nearer, "nearer than --min-distance %g",
-                 nearer.reached < nearer.limit ? most("beyond", nearer.reached) : "", "smaller");
+                 nearer.reached < nearer.limit ? most("beyond", nearer.reached) : "",
+                 "smaller one");
   report_if_many(farther, "farther than --max-distance %g",
                  // Those of hardly any parallax have no distance.
-                 farther.reached > farther.limit ? most("within", farther.reached) : "", "larger");
+                 farther.reached > farther.limit ? most("within", farther.reached) : "",
+                 is_unit_doubtful ? "larger one, or correct the calibration's unit" : "larger one");
 }

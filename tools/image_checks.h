@@ -35,5 +35,7 @@ std::vector<MatchedViews> match_with_first(const widestereo::Rig& rig,
                                            const std::vector<cv::Mat>& images,
                                            const widestereo::Options& options);
 /// Says, on standard error, where many features of all pairs lie outside the range of distances,
-/// which the pixels there cannot tell: they match something else. `unit`: of lengths.
-void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const std::string& unit);
+/// which the pixels there cannot tell: they match something else. `unit`: of lengths;
+/// `is_unit_doubtful`: the calibration may have another one.
+void report_features_out_of_range(const std::vector<MatchedViews>& pairs, const std::string& unit,
+                                  bool is_unit_doubtful);

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "calibration_fit.h"
 #include "matching_run.h"
 #include "option_checks.h"
 #include "progress_bar.h"
@@ -175,6 +176,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
   }
   const std::vector<Eigen::Isometry3d>& world_from_rig = known.poses;
   PosedImages posed;
+  posed.is_unit_doubtful = report_long_baseline(of_frame);
   posed.are_of_one_frame = known.frames.size() == 1;
   for (std::size_t k = 0; k < known.frames.size(); ++k) {
     const ws::SequenceFrame& frame = chosen.all[known.frames[k]];

@@ -35,6 +35,7 @@ struct PosedImages {
   std::function<std::optional<widestereo::DistanceRange>(const Images&)> distances;
   bool in_metres = true;
   bool are_of_one_frame = false;  ///< of a rig
+  bool is_unit_doubtful = false;  ///< as report_long_baseline() asks
   /// Of the frame of the views, in that of the trajectory or model: coordinates stay small.
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 

@@ -316,7 +316,7 @@ class Reconstruction {
               .front());
     }
     report_calibration_errors(pairs, !images_.are_of_one_frame);
-    report_features_out_of_range(pairs, images_.in_metres ? " m" : "");
+    report_features_out_of_range(pairs, images_.in_metres ? " m" : "", images_.is_unit_doubtful);
   }
 
   /// `progress`: empty where nobody sees it.

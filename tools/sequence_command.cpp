@@ -140,7 +140,7 @@ Selection select_frames(const SequenceArguments& a) {
       match_with_first(selection.rig, first, a.settings.options());
   selection.blurs = a.sharpness.blurs(selection.rig, first, pairs);
   report_calibration_errors(pairs, false);
-  report_features_out_of_range(pairs, " m");
+  report_features_out_of_range(pairs, " m", report_long_baseline(selection.rig));
   if (a.poses.given()) {
     selection.motion = a.poses.read(selection.rig, a.rig.calibration, frames.all, frames.chosen,
                                     a.frames.skip_incomplete);

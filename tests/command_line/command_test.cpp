@@ -1212,6 +1212,8 @@ class TexturedPair : public Command {
             "sequence " + folder_.path().string(),
             "reconstruct " + folder_.path().string() + " --count 1"};
   }
+  static constexpr const char* doubt =
+      "The baseline is 100 m long; calibrations are in metres, is this one?";
   /// What a command prints, which ends well.
   std::string output_of(const std::string& command, const std::string& calibration,
                         const std::string& min_distance) {
@@ -1291,11 +1293,38 @@ TEST_F(TexturedPair, BaselinesOfOtherUnitsAreDoubted) {
                  file(calibration) + json)
           .output;
     };
-    const std::string doubt =
-        "The baseline is 100 m long; calibrations are in metres, is this one?";
     EXPECT_THAT(output_with("millimetres.yaml"), HasSubstr(doubt));
     EXPECT_THAT(output_with("calib.yaml"), Not(HasSubstr("metres")));
+    EXPECT_THAT(run("calibration show " + file("millimetres.yaml") + json).output,
+                HasSubstr(doubt));
+    EXPECT_THAT(run("calibration show " + file("calib.yaml") + json).output,
+                Not(HasSubstr("is this one?")));
   }
+  const auto refined = [&](const char* calibration) {
+    return run("calibration refine " + file("left.png") + " " + file("right.png") + " -c " +
+               file(calibration) + " -o " + file("refined.yaml"))
+        .output;
+  };
+  EXPECT_THAT(refined("millimetres.yaml"), HasSubstr(doubt));
+  EXPECT_THAT(refined("calib.yaml"), Not(HasSubstr(doubt)));
+}
+
+/// A larger range would hide what is wrong.
+TEST_F(ShiftedPair, FarFeaturesOfOtherUnitsMakeTheUnitDoubtful) {
+  folder_.write("millimetres.yaml", replaced(bytes_of("calib.yaml"), "-0.1]", "-100]"));
+  const std::vector<std::string> commands = matching_commands();
+  for (const std::string& command : commands) {
+    const std::string output = output_of(command, "millimetres.yaml", "0.1 --max-distance 200");
+    EXPECT_THAT(output, HasSubstr(doubt));
+    EXPECT_THAT(output, HasSubstr("give a larger one, or correct the calibration's unit."));
+    EXPECT_THAT(output_of(command, "calib.yaml", "0.1"), Not(HasSubstr("calibration's unit")));
+  }
+  // The way of a camera is no baseline of a rig.
+  write_first_camera();
+  folder_.write("poses.txt", "0 0 0 0 0 0 0 1\n1 100 0 0 0 0 0 1\n");
+  EXPECT_THAT(output_of(commands.front(), "mono.yaml",
+                        "0.1 --max-distance 200 --poses " + file("poses.txt")),
+              Not(HasSubstr("calibration's unit")));
 }
 
 /// Patches are looked for on epipolar curves alone.
