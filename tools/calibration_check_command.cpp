@@ -31,9 +31,6 @@ struct CheckArguments {
   bool as_json = false;
 };
 
-/// Pixels of median epipolar error, of the right calibration at all.
-constexpr double of_these_cameras = 3;
-
 /// The median epipolar error, of points before the cameras; infinite where they are not.
 double error_before_cameras(const ws::View& first, const ws::View& second,
                             const std::vector<ws::PixelMatch>& matches) {

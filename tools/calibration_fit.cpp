@@ -61,6 +61,40 @@ std::optional<Misfit> misfit_of(const MatchedViews& pair, const ws::EpipolarRepo
   return Misfit{&pair, now, std::nullopt};
 }
 
+std::optional<Misfit> far_off(const MatchedViews& pair, const ws::EpipolarReport& report) {
+  if (!lie_behind(report) && report.median_pixels < of_these_cameras) return std::nullopt;
+  return Misfit{&pair, report.median_pixels, std::nullopt};
+}
+
+/// What sentences say of, and the worst of it.
+struct Misfits {
+  std::string subject;
+  Misfit worst;
+};
+
+/// Nothing where all pairs, or all but a few of many, fit.
+std::optional<Misfits> find_misfits(const std::vector<MatchedViews>& pairs,
+                                    decltype(misfit_of)& judge) {
+  constexpr std::size_t one_in = 4;
+  std::size_t told = 0;
+  std::vector<Misfit> misfits;
+  for (const MatchedViews& pair : pairs) {
+    const auto report = report_of(pair);
+    if (!report) continue;
+    ++told;
+    if (const auto misfit = judge(pair, *report)) misfits.push_back(*misfit);
+  }
+  if (misfits.empty() || one_in * misfits.size() < told) return std::nullopt;
+  const Misfit& worst =
+      *std::min_element(misfits.begin(), misfits.end(),
+                        [](const Misfit& a, const Misfit& b) { return a.is_worse_than(b); });
+  if (pairs.size() == 1) return Misfits{"The features of the images", worst};
+  return Misfits{"The features of " + worst.pair->first.name + " and " + worst.pair->second.name +
+                     " (" + std::to_string(misfits.size()) + " of " + std::to_string(told) +
+                     " pairs are like this)",
+                 worst};
+}
+
 }  // namespace
 
 bool will_do(const ws::EpipolarReport& report) {
@@ -81,24 +115,9 @@ bool report_long_baseline(const ws::Rig& rig) {
 }
 
 void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_poses) {
-  constexpr std::size_t one_in = 4;
-  std::size_t told = 0;
-  std::vector<Misfit> misfits;
-  for (const MatchedViews& pair : pairs) {
-    const auto report = report_of(pair);
-    if (!report) continue;
-    ++told;
-    if (const auto misfit = misfit_of(pair, *report)) misfits.push_back(*misfit);
-  }
-  if (misfits.empty() || one_in * misfits.size() < told) return;
-  const Misfit& worst =
-      *std::min_element(misfits.begin(), misfits.end(),
-                        [](const Misfit& a, const Misfit& b) { return a.is_worse_than(b); });
-  const std::string subject =
-      pairs.size() == 1 ? "The features of the images"
-                        : "The features of " + worst.pair->first.name + " and " +
-                              worst.pair->second.name + " (" + std::to_string(misfits.size()) +
-                              " of " + std::to_string(told) + " pairs are like this)";
+  const auto found = find_misfits(pairs, misfit_of);
+  if (!found) return;
+  const auto& [subject, worst] = *found;
   if (worst.refined) {
     say(subject +
         ws::formatted(" lie %.2f px off their epipolar curves (median), and would lie %.2f px off "
@@ -109,4 +128,11 @@ void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_
     say(subject + " do not fit " + (has_poses ? "the poses, or " : "") +
         "the calibration; see `widestereo calibration check`.");
   }
+}
+
+void report_pose_errors(const std::vector<MatchedViews>& pairs) {
+  const auto found = find_misfits(pairs, far_off);
+  if (!found) return;
+  say(found->subject +
+      " do not fit --poses, which frames are started by; see `widestereo calibration check`.");
 }

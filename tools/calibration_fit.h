@@ -8,6 +8,9 @@
 #include "widestereo/epipolar.h"
 #include "widestereo/rig.h"
 
+/// Pixels of median epipolar error, at most, of the right calibration at all.
+constexpr double of_these_cameras = 3;
+
 /// Whether the calibration will do for stereo.
 bool will_do(const widestereo::EpipolarReport& report);
 
@@ -20,3 +23,6 @@ bool report_long_baseline(const widestereo::Rig& rig);
 /// hardly see the same, so that a few do not count. `has_poses`: the views stand as poses or a
 /// model say, not as cameras of a rig.
 void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_poses);
+/// Likewise of frames that are started from the planes of the one before by the poses of --poses,
+/// which need not be as accurate.
+void report_pose_errors(const std::vector<MatchedViews>& pairs);

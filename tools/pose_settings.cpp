@@ -86,6 +86,14 @@ Eigen::Vector3d move_near_origin(std::vector<ws::View>& views) {
   return origin;
 }
 
+ws::View posed_view(const ws::View& view, const Eigen::Isometry3d& world_from_rig,
+                    const std::string& frame) {
+  ws::View posed = view;
+  posed.name = frame + "/" + view.name;
+  posed.world_from_camera = world_from_rig * view.world_from_camera;
+  return posed;
+}
+
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses) {
   rig.add_to(command, RigSettings::or_model);
   poses.add_to(

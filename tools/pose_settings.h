@@ -40,6 +40,10 @@ struct PoseSettings {
 /// precision does for their points, and says so. Returns what their positions are relative to then.
 Eigen::Vector3d move_near_origin(std::vector<widestereo::View>& views);
 
+/// A view of a rig at one of its poses, named after the frame.
+widestereo::View posed_view(const widestereo::View& view, const Eigen::Isometry3d& world_from_rig,
+                            const std::string& frame);
+
 /// Adds the options that calibrated_images() takes.
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses);
 

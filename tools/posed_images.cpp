@@ -181,10 +181,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
   for (std::size_t k = 0; k < known.frames.size(); ++k) {
     const ws::SequenceFrame& frame = chosen.all[known.frames[k]];
     for (std::size_t i = 0; i < of_frame.views.size(); ++i) {
-      ws::View view = of_frame.views[i];
-      view.name = frame.name + "/" + view.name;
-      view.world_from_camera = world_from_rig[k] * view.world_from_camera;
-      posed.calibrated.push_back(std::move(view));
+      posed.calibrated.push_back(posed_view(of_frame.views[i], world_from_rig[k], frame.name));
       posed.files.push_back(frame.images[i]);
     }
   }

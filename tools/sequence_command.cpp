@@ -107,6 +107,43 @@ std::vector<cv::Mat> reduced(std::vector<cv::Mat> images, const ws::SequenceFram
   return images;
 }
 
+/// A few pairs along the sequence, each of a frame's camera 0 and, in turn, a camera of the first
+/// frame after it from where the rig has moved as far as its cameras are apart, if it soon does.
+std::vector<MatchedViews> pairs_along(const Selection& selection, const SequenceArguments& a) {
+  constexpr std::size_t places = 4;
+  constexpr std::size_t soon = 10;  // frames
+  const std::vector<Eigen::Isometry3d>& poses = selection.motion.poses;
+  const std::vector<ws::View>& views = selection.rig.views;
+  const auto view_at = [&](std::size_t frame, std::size_t camera) {
+    return posed_view(views[camera], poses[frame], selection.frames[frame].name);
+  };
+  const auto image_at = [&](std::size_t frame, std::size_t camera) {
+    const fs::path& file = selection.frames[frame].images[camera];
+    return a.size.reduced(a.white_level.read_of_many(file), selection.calibrated.views[camera],
+                          file.string());
+  };
+  std::vector<MatchedViews> pairs;
+  for (std::size_t k = 0; k < places; ++k) {
+    const std::size_t begin = k * poses.size() / places;
+    const std::size_t last = std::min(begin + soon, poses.size() - 1);
+    if (begin == last) continue;
+    const ws::View first = view_at(begin, 0);
+    std::size_t end = begin + 1;
+    while (end < last && baseline(first, view_at(end, 0)) < baseline(views[0], views[1])) ++end;
+    // What two cameras see depends on the poses' unit, too.
+    const std::size_t camera = k % 2;
+    const ws::Rig rig{.views = {first, view_at(end, camera)}};
+    try {
+      pairs.push_back(
+          match_with_first(rig, {image_at(begin, 0), image_at(end, camera)}, a.settings.options())
+              .front());
+    } catch (const ws::Error&) {
+      // of an image that cannot be read, of which matching will tell
+    }
+  }
+  return pairs;
+}
+
 Selection select_frames(const SequenceArguments& a) {
   std::vector<int> cameras = a.rig.views;
   if (cameras.empty()) {
@@ -146,6 +183,7 @@ Selection select_frames(const SequenceArguments& a) {
                                     a.frames.skip_incomplete);
     selection.frames.clear();
     for (const std::size_t i : selection.motion.frames) selection.frames.push_back(frames.all[i]);
+    report_pose_errors(pairs_along(selection, a));
   }
   return selection;
 }
@@ -390,6 +428,22 @@ class SequenceRun {
   std::size_t matched_ = 0;
 };
 
+/// Where most frames could not be started by their poses.
+void report_poses_of_no_use(const Json& frames) {
+  std::size_t started = 0;
+  std::size_t again = 0;
+  for (const Json& frame : frames) {
+    if (frame["motion"] != "poses") continue;
+    ++started;
+    if (frame["start"] != "warm") ++again;
+  }
+  constexpr std::size_t fewest = 2;  // one may be a scene cut
+  if (again < fewest || 2 * again <= started) return;
+  say(std::to_string(again) + " of " + std::to_string(started) +
+      " frames were matched again by themselves, as little was accepted where they were started by "
+      "their poses; check --poses and its unit.");
+}
+
 /// Means over the frames of one kind.
 void summarise(const Json& frames, bool warm) {
   double milliseconds = 0;
@@ -418,6 +472,7 @@ void run_sequence(const SequenceArguments& arguments) {
   for (const Json& frame : run.folder().frames()) accepted += frame["accepted"].get<double>();
   report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()),
                          "the order of the cameras");
+  report_poses_of_no_use(run.folder().frames());
   if (arguments.as_json) {
     std::cout << ws::to_text(run.folder().record()) << "\n";
     return;

@@ -605,7 +605,7 @@ class SequenceOfTheDemo : public Command {
   }
   /// Share of the second frame's pixels that are wrong by more than a tenth, the first one having
   /// started it by this motion of the rig.
-  double wrong_after(const Eigen::Isometry3d& first_from_second) const {
+  double wrong_after(const Eigen::Isometry3d& first_from_second) {
     std::ostringstream poses;
     const Eigen::Quaterniond q(first_from_second.linear());
     poses << "0 0 0 0 0 0 0 1\n1 " << first_from_second.translation().transpose() << ' '
@@ -617,6 +617,7 @@ class SequenceOfTheDemo : public Command {
             "--min-distance 0.5 --max-distance 20 --restart-below 0 --poses " + file("poses.txt"));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
     EXPECT_NE(outcome.output.find("warm, motion poses"), std::string::npos) << outcome.output;
+    output_ = outcome.output;
     const cv::Mat distance = cv::imread(file("out/001/distance0.tiff"), cv::IMREAD_UNCHANGED);
     const GroundTruth& truth = frames_[1].views[0].truth;
     const cv::Mat counted = (truth.distance > 0) & (truth.occlusion == 255);
@@ -626,12 +627,21 @@ class SequenceOfTheDemo : public Command {
 
   static constexpr int size = 160;
   std::vector<RenderedPair> frames_;
+  std::string output_;  ///< of the last run
 };
 
 TEST_F(SequenceOfTheDemo, KnownMotionLeadsFromTheFrameBefore) {
   const double right = wrong_after(world_from_rig(1));
   EXPECT_LT(right, 0.1);
   EXPECT_GT(wrong_after(world_from_rig(1).inverse()), 2 * right) << "the way back";
+}
+
+TEST_F(SequenceOfTheDemo, PosesThatDoNotFitAreReported) {
+  const std::string misfit = "pairs are like this) do not fit --poses";
+  wrong_after(world_from_rig(1));
+  EXPECT_EQ(output_.find(misfit), std::string::npos) << output_;
+  wrong_after(world_from_rig(1).inverse());
+  EXPECT_NE(output_.find(misfit), std::string::npos) << output_;
 }
 
 TEST_F(SequenceOfTheDemo, ImagesWithoutAMaskEndWhereTheyTurnBlack) {
@@ -717,6 +727,20 @@ TEST_F(SequencePoses, FramesWithOtherPosesAreMatchedAgain) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_TRUE(bytes_of(folder_ / "out/001/result.json") == second);
   EXPECT_NE(outcome.output.find("002: "), std::string::npos) << outcome.output;
+}
+
+TEST_F(SequencePoses, ThatNoFrameCanBeStartedByAreReported) {
+  const std::string hint =
+      "2 of 2 frames were matched again by themselves, as little was accepted where they were "
+      "started by their poses; check --poses and its unit.";
+  const std::string always = replaced(with("camera.txt", "out"), "below 0 ", "below 1 ");
+  const Outcome never = run(with("camera.txt", "out"));
+  EXPECT_EQ(never.output.find("matched again"), std::string::npos) << never.output;
+  std::string poses = bytes_of("camera.txt");
+  folder_.write("camera.txt", replaced(poses, "\n1 ", "\n1 1000"));
+  const Outcome outcome = run(always + "--overwrite");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find(hint), std::string::npos) << outcome.output;
 }
 
 TEST_F(SequencePoses, AreOfAllFramesAlsoOfThoseLeftOut) {
