@@ -47,9 +47,23 @@ Eigen::Vector2d last_pixel(const ws::View& view) {
   return {view.camera.width - 1, view.camera.height - 1};
 }
 
-/// What was mistaken for what, where that explains the matches better than anything else.
+/// The second view where its coordinates are R x + T of the first one's.
+ws::View view_at(const ws::View& second, const ws::View& first, const Eigen::Matrix3d& rotation,
+                 const Eigen::Vector3d& translation) {
+  Eigen::Isometry3d second_from_first = Eigen::Isometry3d::Identity();
+  second_from_first.linear() = rotation;
+  second_from_first.translation() = translation;
+  ws::View there = second;
+  there.world_from_camera = first.world_from_camera * second_from_first.inverse();
+  return there;
+}
+
+constexpr double as_good = 1.5;  // where errors hardly differ, nobody could tell
+
+/// What was mistaken for what, where that explains the matches better than anything else and leaves
+/// less than `limit` of their median error.
 std::string mistake(const ws::View& first, const ws::View& second,
-                    const std::vector<ws::PixelMatch>& matches) {
+                    const std::vector<ws::PixelMatch>& matches, double limit, bool has_poses) {
   std::vector<ws::PixelMatch> swapped = matches;
   for (ws::PixelMatch& match : swapped) std::swap(match.first, match.second);
   std::vector<ws::PixelMatch> turned = matches;
@@ -63,17 +77,33 @@ std::string mistake(const ws::View& first, const ws::View& second,
   ws::View opposite = second;
   opposite.world_from_camera.translation() =
       2 * first.world_from_camera.translation() - second.world_from_camera.translation();
-  const std::pair<const char*, double> remedies[] = {
+  std::vector<std::pair<const char*, double>> remedies = {
       {"swap the images", error_before_cameras(first, second, swapped)},
       {"invert the poses", error_before_cameras(first_there, second_there, matches)},
       {"turn the baseline round (-T)", error_before_cameras(first, opposite, matches)},
       {"turn both images by 180 degrees", error_before_cameras(first, second, turned)}};
-  double least = of_these_cameras;
+  if (!has_poses) {
+    const Eigen::Isometry3d motion = source_from_reference(second, first);
+    const Eigen::Matrix3d r = motion.linear();
+    const Eigen::Vector3d t = motion.translation();
+    const Eigen::Matrix3d flip = Eigen::Vector3d(1, -1, -1).asDiagonal();
+    const auto error_at = [&](const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
+      return error_before_cameras(first, view_at(second, first, rotation, translation), matches);
+    };
+    remedies.emplace_back("transpose R", error_at(r.transpose(), t));
+    remedies.emplace_back("turn the y and z axes of R and T round, which are OpenGL's",
+                          error_at(flip * r * flip, flip * t));
+    // Of cameras that hardly turn it is -T.
+    const double of_centre = error_at(r, -(r * t));
+    if (as_good * of_centre < remedies[2].second) {
+      remedies.emplace_back("take -R T for T, which is where the camera is", of_centre);
+    }
+  }
+  double least = limit;
   for (const auto& remedy : remedies) least = std::min(least, remedy.second);
   std::string words;
   for (const auto& [words_of_it, error] : remedies) {
-    const double as_good = 1.5 * least;  // where they hardly differ, nobody could tell
-    if (!(error < of_these_cameras) || error > as_good) continue;
+    if (!(error < limit) || error > as_good * least) continue;
     words += (words.empty() ? "" : ", or ") + std::string(words_of_it);
   }
   return words;
@@ -85,12 +115,16 @@ std::string verdict_of(const ws::EpipolarReport& report, const ws::View& first,
   if (will_do(report)) {
     return report.median_pixels < 0.5 ? "good" : "usable, expect errors where texture is fine";
   }
+  constexpr double much_less = 1.0 / 3;
+  const double limit = lie_behind(report)
+                           ? of_these_cameras
+                           : std::min(of_these_cameras, much_less * report.median_pixels);
+  const std::string remedy = mistake(first, second, matches, limit, has_poses);
+  if (!remedy.empty()) return "wrong way round: " + remedy;
   if (!lie_behind(report) && report.median_pixels < of_these_cameras) {
     return has_poses ? "too inaccurate for stereo: calibrate again, or get better poses"
                      : "too inaccurate for stereo: calibrate again";
   }
-  const std::string remedy = mistake(first, second, matches);
-  if (!remedy.empty()) return "wrong way round: " + remedy;
   return has_poses
              ? "does not fit: are the poses those of these images, to world, with quaternions "
                "in their file's order?"

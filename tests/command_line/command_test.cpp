@@ -15,6 +15,8 @@
 #include "same_bits.h"
 #include "text/formatted.h"
 #include "widestereo/calibration.h"
+#include "widestereo/image_io.h"
+#include "widestereo/synthesis.h"
 
 namespace widestereo::test {
 namespace {
@@ -1427,6 +1429,50 @@ TEST_F(ShiftedPair, SwappedImagesAreNotRefined) {
   EXPECT_NE(outcome.output.find("no feature is near enough"), std::string::npos) << outcome.output;
   outcome = run(calibration("check", "left.png", copy_of("left.png")) + "--json");
   EXPECT_TRUE(json_of(outcome)["distance_p5"].is_null()) << outcome.output;
+}
+
+/// As libraries and other conventions make them.
+TEST_F(Command, MistakenExtrinsicsAreTold) {
+  Rig rig = demo_rig(200);
+  const Eigen::Vector3d t(-0.2, 0.03, 0.02);
+  const auto place = [](Rig& there, const Eigen::Matrix3d& rotation,
+                        const Eigen::Vector3d& translation) {
+    Eigen::Isometry3d second_from_first = Eigen::Isometry3d::Identity();
+    second_from_first.linear() = rotation;
+    second_from_first.translation() = translation;
+    there.views[1].world_from_camera =
+        there.views[0].world_from_camera * second_from_first.inverse();
+  };
+  const auto render = [&](double degrees, const Eigen::Vector3d& axis) {
+    const Eigen::Matrix3d r =
+        Eigen::AngleAxisd(degrees * radians_per_degree, axis).toRotationMatrix();
+    place(rig, r, t);
+    const RenderedPair pair = render_demo_room(rig);
+    for (const int i : {0, 1}) write_image(file(std::to_string(i) + ".png"), pair.views[i].image);
+    return r;
+  };
+  const auto verdict = [&](const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
+    Rig written = rig;
+    place(written, rotation, translation);
+    write_kalibr(file("written.yaml"), written);
+    return run("calibration check " + file("0.png") + " " + file("1.png") + " -c " +
+               file("written.yaml"))
+        .output;
+  };
+  const Eigen::Matrix3d r = render(15, Eigen::Vector3d(1, 2, -2) / 3);
+  const Eigen::Matrix3d flip = Eigen::Vector3d(1, -1, -1).asDiagonal();
+  const std::string wrong = "calibration: wrong way round: ";
+  EXPECT_THAT(verdict(r, t), HasSubstr("calibration: good\n"));
+  EXPECT_THAT(verdict(r.transpose(), t), HasSubstr(wrong + "transpose R\n"));
+  EXPECT_THAT(verdict(r, -(r.transpose() * t)),
+              HasSubstr(wrong + "take -R T for T, which is where the camera is\n"));
+  EXPECT_THAT(verdict(flip * r * flip, flip * t),
+              HasSubstr(wrong + "turn the y and z axes of R and T round, which are OpenGL's\n"));
+  // Of small rotations the error is small, too.
+  const Eigen::Matrix3d little = render(1.2, Eigen::Vector3d::UnitX());
+  const std::string told = verdict(little.transpose(), t);
+  EXPECT_THAT(told, ContainsRegex("median [12][.]"));
+  EXPECT_THAT(told, HasSubstr(wrong + "transpose R\n"));
 }
 
 TEST_F(Command, ViewSynthesisScoresWithoutGroundTruth) {
