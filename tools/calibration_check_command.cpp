@@ -4,6 +4,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -111,7 +112,7 @@ std::string mistake(const ws::View& first, const ws::View& second,
 
 std::string verdict_of(const ws::EpipolarReport& report, const ws::View& first,
                        const ws::View& second, const std::vector<ws::PixelMatch>& matches,
-                       bool has_poses) {
+                       const CheckArguments& arguments, bool has_poses) {
   if (will_do(report)) {
     return report.median_pixels < 0.5 ? "good" : "usable, expect errors where texture is fine";
   }
@@ -125,11 +126,11 @@ std::string verdict_of(const ws::EpipolarReport& report, const ws::View& first,
     return has_poses ? "too inaccurate for stereo: calibrate again, or get better poses"
                      : "too inaccurate for stereo: calibrate again";
   }
-  return has_poses
-             ? "does not fit: are the poses those of these images, to world, with quaternions "
-               "in their file's order?"
-             : "does not fit: are the images of one moment, and of these cameras? Then calibrate "
-               "again";
+  if (!has_poses) {
+    return "does not fit: are the images of one moment, and of these cameras? Then calibrate again";
+  }
+  return std::string("does not fit: are the poses those of these images, to world") +
+         (arguments.poses.given() ? ", with quaternions in their file's order?" : "?");
 }
 
 std::string distances_of(const ws::EpipolarReport& report, const char* unit) {
@@ -149,9 +150,9 @@ bool check(const CheckArguments& arguments) {
   require_different_images({arguments.left, arguments.right});
   const cv::Mat left = arguments.white_level.read(arguments.left);
   const cv::Mat right = arguments.white_level.read(arguments.right);
-  const ws::CalibratedImages images =
-      calibrated_images(arguments.rig, arguments.poses, {arguments.left, arguments.right},
-                        left.size(), arguments.rig.sfm_model());
+  const std::optional<ws::SfmModel> model = arguments.rig.sfm_model();
+  const ws::CalibratedImages images = calibrated_images(
+      arguments.rig, arguments.poses, {arguments.left, arguments.right}, left.size(), model);
   const ws::View& first = images.rig.views[0];
   const ws::View& second = images.rig.views[1];
   ws::require_calibrated_size(left, first, arguments.left);
@@ -162,7 +163,8 @@ bool check(const CheckArguments& arguments) {
   const auto sharpness = ws::compare_sharpness(first, second, left, right, matches);
   // Negative where the second image is the sharper one.
   const double blur = !sharpness ? 0 : sharpness->sharper == 0 ? sharpness->blur : -sharpness->blur;
-  const std::string verdict = verdict_of(r, first, second, matches, arguments.poses.given());
+  const std::string verdict =
+      verdict_of(r, first, second, matches, arguments, model || arguments.poses.given());
   if (images.in_metres && !arguments.poses.given()) report_long_baseline(images.rig);
   if (arguments.as_json) {
     // 0: there is none

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "command_fixture.h"
+#include "replaced.h"
 #include "same_bits.h"
 
 namespace widestereo {
@@ -164,6 +165,26 @@ TEST_F(ColmapCommand, MasksAndFieldsOfViewApply) {
   EXPECT_EQ(json_of(outcome)["views"][1]["max_theta_degrees"], 50);
   EXPECT_EQ(cv::countNonZero(distance_in("colmap").colRange(0, 48)), 0);
   EXPECT_GT(cv::countNonZero(distance_in("colmap").colRange(48, 96)), 500);
+}
+
+/// Poses are at fault, not a rig.
+TEST_F(ColmapCommand, ImagesThatDoNotFitTheModelAreAskedAbout) {
+  const auto write = [this](const std::string& name, int shift) {
+    cv::Mat noise(96, 110, CV_8UC1);
+    cv::RNG(5).fill(noise, cv::RNG::UNIFORM, 0, 255);
+    cv::GaussianBlur(noise, noise, {}, 1);
+    cv::imwrite(file(name), noise.colRange(shift, shift + 96));
+  };
+  write("left.png", 0);
+  write("right.png", 6);
+  folder_.write("model/images.txt", test::replaced(bytes_of("model/images.txt"), "2 1 0 0 0 -0.1",
+                                                   "2 0.97 0.26 0 0 -0.1"));
+  const Outcome outcome = run("calibration check " + file("left.png") + " " + file("right.png") +
+                              " -c " + file("model"));
+  EXPECT_EQ(outcome.exit_code, 2) << outcome.output;
+  EXPECT_NE(outcome.output.find("does not fit: are the poses those of these images, to world?\n"),
+            std::string::npos)
+      << outcome.output;
 }
 
 /// All of them, one of which sees nothing of the others.
