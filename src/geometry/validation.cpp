@@ -182,11 +182,11 @@ std::string remedy_of_size(cv::Size given, cv::Size calibrated) {
            "COLMAP model, which needs the original ones (and --max-image-size)";
   }
   if (is_scaled && share > 1.05) {
-    const bool is_multiple = given == calibrated * cvRound(share);
     return same +
-           "; reduce images to that calibrated, or make a calibration for larger ones by "
-           "`calibration convert --scale" +
-           (is_multiple ? " " + text_of(cvRound(share)) : "") + "`";
+           formatted(
+               "; reduce images to that calibrated, or make a calibration for larger ones by "
+               "`calibration convert --scale %.6g`",
+               share);
   }
   if (given.width <= calibrated.width && given.height <= calibrated.height) {
     return same +

@@ -142,7 +142,7 @@ TEST(Maps, HaveTheCalibratedSize) {
       "; reduce images to that calibrated, or make a calibration for larger ones by `calibration "
       "convert --scale";
   expect(128, 96, enlarged + " 2`");
-  expect(96, 72, enlarged + "`");
+  expect(96, 72, enlarged + " 1.5`");
 }
 
 TEST(Masks, ExcludeTheNearestPixelAndWhatIsOutside) {
