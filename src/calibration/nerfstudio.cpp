@@ -160,7 +160,7 @@ class Reader {
 
   double number(const Json& frame, std::size_t i, const char* key) const {
     const Json* value = find(frame, key);
-    const std::string name = "\"" + std::string(key) + "\"";
+    const std::string name = std::string("\"").append(key) + "\"";
     if (value == nullptr) fail(i, "The number " + name + " is missing", "add it");
     if (!value->is_number()) fail(i, name + " is no number", "write it without quotes or brackets");
     return value->get<double>();
