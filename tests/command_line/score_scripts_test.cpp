@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The scripts that match and score data sets, with a stand-in for what matches.
 #include "command_fixture.h"
+#include "widestereo/image_io.h"
 
 namespace widestereo::test {
 namespace {
@@ -42,7 +43,7 @@ TEST_F(ScoreScripts, AblationTakesSetsThatLackNormals) {
     fs::copy_file(file("left.png"), file("full/" + camera + ".png"));
   }
   cv::imwrite(file("bare/mask.png"), cv::Mat(96, 96, CV_8UC1, cv::Scalar(255)));
-  cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
+  write_map(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
   fs::copy_file(file("normals.tiff"), file("full/normal0.tiff"));
   write_distances("map.tiff", 2.1);
   write_stand_in(
