@@ -206,6 +206,7 @@ VkDescriptorSet VulkanBackend::descriptor_set(int first_view) const {
 }
 
 void VulkanBackend::start_memory() {
+  if (memory_started_) return;
   const VkCommandBuffer commands = submissions_[0]->begin();
   const auto clear = [&](const LayeredImage& image, const VkClearColorValue& value) {
     constexpr VkImageSubresourceRange all = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0,
@@ -239,7 +240,7 @@ void VulkanBackend::start_memory() {
 }
 
 VkCommandBuffer VulkanBackend::begin_transfer() {
-  if (!memory_started_) start_memory();
+  start_memory();
   return submissions_[0]->begin();
 }
 
@@ -477,6 +478,7 @@ void VulkanBackend::compile(const Schedule& schedule) {
 
 void VulkanBackend::run(const Schedule& schedule, const Matcher::Progress& progress) {
   compile(schedule);
+  start_memory();
   times_.clear();
   milliseconds_ = 0;
   const std::vector<Band> bands = split_into_bands(schedule, max_samples_);

@@ -83,8 +83,8 @@ class VulkanBackend final : public Backend {
   void make_buffers(const VulkanContext& context);
   void make_descriptor_sets();
   VkDescriptorSet make_descriptor_set(const LayeredImage& texels_of_level);
-  /// Fills memory before anything is transferred, and not before: an application's queue is left
-  /// alone while kernels are compiled.
+  /// Fills memory once, when something is to be transferred or run and not before: an application's
+  /// queue is left alone while kernels are compiled.
   void start_memory();
   VkCommandBuffer begin_transfer();
   void transition(VkCommandBuffer commands, const LayeredImage& image,
