@@ -84,7 +84,11 @@ std::optional<Misfits> find_misfits(const std::vector<MatchedViews>& pairs,
     ++told;
     if (const auto misfit = judge(pair, *report)) misfits.push_back(*misfit);
   }
-  if (misfits.empty() || one_in * misfits.size() < told) return std::nullopt;
+  const auto unfit = static_cast<std::size_t>(
+      std::count_if(misfits.begin(), misfits.end(),
+                    [](const Misfit& misfit) { return !misfit.refined.has_value(); }));
+  // Odometry is a little inaccurate here and there.
+  if (misfits.empty() || (one_in * unfit < told && 2 * misfits.size() <= told)) return std::nullopt;
   const Misfit& worst =
       *std::min_element(misfits.begin(), misfits.end(),
                         [](const Misfit& a, const Misfit& b) { return a.is_worse_than(b); });

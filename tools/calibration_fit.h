@@ -19,9 +19,9 @@ bool will_do(const widestereo::EpipolarReport& report);
 bool report_long_baseline(const widestereo::Rig& rig);
 
 /// Says, on standard error, where the features of pairs fit their calibration much less than they
-/// would fit a better one: patches are looked for on epipolar curves alone. Of many pairs some may
-/// hardly see the same, so that a few do not count. `has_poses`: the views stand as poses or a
-/// model say, not as cameras of a rig.
+/// would fit a better one: patches are looked for on epipolar curves alone. Of many pairs a few,
+/// which may hardly see the same, do not count, nor do small errors but of most. `has_poses`: the
+/// views stand as poses or a model say, not as cameras of a rig.
 void report_calibration_errors(const std::vector<MatchedViews>& pairs, bool has_poses);
 /// Likewise of frames that are started from the planes of the one before by the poses of --poses,
 /// which need not be as accurate.

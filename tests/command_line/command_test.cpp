@@ -1379,6 +1379,27 @@ TEST_F(TexturedPair, PosesOfManyImagesAreChecked) {
   }
 }
 
+/// Those that see hardly anything in common tell nothing.
+TEST_F(Command, CamerasThatLookAroundFit) {
+  const RenderedPair pictures = render_demo_room(surround_rig(160));
+  write_kalibr(file("around.yaml"), pictures.rig);
+  std::string images;
+  for (std::size_t i = 0; i < pictures.views.size(); ++i) {
+    const std::string folder = "data/cam" + std::to_string(i);
+    fs::create_directories(folder_ / folder);
+    write_image(folder_ / folder / "0.png", pictures.views[i].image);
+    images += " " + file(folder + "/0.png");
+  }
+  for (const std::string& command :
+       {"depth" + images + " -o " + file("depth"),
+        "reconstruct " + file("data") + " --count 1 -o " + file("scene")}) {
+    const Outcome outcome =
+        run(command + " -c " + file("around.yaml") + " --preset fast --device cpu");
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    EXPECT_THAT(outcome.output, Not(HasSubstr("features")));
+  }
+}
+
 /// As of one camera on both channels.
 TEST_F(ShiftedPair, OnePictureIsNoPair) {
   fs::copy(folder_ / "left.png", folder_ / "copy.png");
