@@ -94,18 +94,6 @@ class AgreeingViews {
   vec3 first_;
 };
 
-/// Pixels that the source sees the point at `ray` / w move per unit of w.
-double pixels_per_inverse_distance(const View& source, const View& reference,
-                                   const Eigen::Vector3d& ray, double w) {
-  const Eigen::Isometry3d motion = source_from_reference(source, reference);
-  constexpr double step = 1e-4;
-  Eigen::Vector2d nearer;
-  Eigen::Vector2d farther;
-  EXPECT_TRUE(project(source.camera, motion * (ray / (w + step)), nearer));
-  EXPECT_TRUE(project(source.camera, motion * (ray / (w - step)), farther));
-  return (nearer - farther).norm() / (2 * step);
-}
-
 TEST(Checks, RejectFromEachOptionsLimitOn) {
   const Eigen::Vector3d m(0.05, 0.1, 0.5);
   const cv::Point pixel(28, 66);  // off both axes

@@ -3,6 +3,8 @@
 // one.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -74,6 +76,18 @@ inline Rig rig_of_baselines(int size, const std::vector<double>& shares) {
     view.world_from_camera.translation() *= share;
   }
   return rig;
+}
+
+/// Pixels that the source sees the point at `ray` / w move per unit of w.
+inline double pixels_per_inverse_distance(const View& source, const View& reference,
+                                          const Eigen::Vector3d& ray, double w) {
+  const Eigen::Isometry3d motion = source_from_reference(source, reference);
+  constexpr double step = 1e-4;
+  Eigen::Vector2d nearer;
+  Eigen::Vector2d farther;
+  EXPECT_TRUE(project(source.camera, motion * (ray / (w + step)), nearer));
+  EXPECT_TRUE(project(source.camera, motion * (ray / (w - step)), farther));
+  return (nearer - farther).norm() / (2 * step);
 }
 
 /// A preset's options for distances of 0.2 to 100 m.
