@@ -50,8 +50,9 @@ TEST_F(ScoreScripts, AblationTakesSetsThatLackNormals) {
       "mkdir -p \"$2\"; cp map.tiff \"$2/distance0.tiff\"\n"
       "cp normals.tiff \"$2/normals0.tiff\"\n"
       "echo 'CPU: 1.50 s, 7 million patch samples (preset fast)'\n");
-  const std::string sets = "'" + file("bare") + " 0.5 9' '" + file("full") + " 0.5 9'";
-  const Outcome outcome = run_script("ablation", file("out") + " fast " + sets);
+  std::string sets;
+  for (const char* set : {"bare", "full"}) sets += " '" + file(set) + " 0.5 9'";
+  const Outcome outcome = run_script("ablation", file("out") + " fast" + sets);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("| change | bare | full | million samples | seconds |"),
             std::string::npos)
@@ -65,7 +66,7 @@ TEST_F(ScoreScripts, AblationTakesSetsThatLackNormals) {
   EXPECT_NE(calls.find("--mask " + file("bare/mask.png")), std::string::npos);
   EXPECT_NE(calls.find("--no-pictures --far-preference 0\n"), std::string::npos);
   fs::remove(file("full/depth0.tiff"));
-  const Outcome unknown = run_script("ablation", file("out") + " fast " + sets);
+  const Outcome unknown = run_script("ablation", file("out") + " fast" + sets);
   EXPECT_EQ(unknown.exit_code, 1);
   EXPECT_NE(unknown.output.find("full has no depth0.tiff"), std::string::npos) << unknown.output;
 }
