@@ -187,10 +187,10 @@ struct Indications {
 // alone. Where next to nothing matches, as in the dark beyond the lens circle, planes agree because nothing contradicts
 // them.
 FN float confidence_of(Indications i) {
-  float agreement = -(0.52f + 0.67f * i.structure.y) * logarithm(1.02f - i.support) * sqrt(i.noise_share);
+  float agreement = -(0.48f + 0.71f * i.structure.y) * logarithm(1.02f - i.support) * sqrt(i.noise_share);
   // Constants come first here, too.
   float log_odds = i.structure.x * (4.22f * i.structure.y * i.evidence + agreement) - 1.58f * doubt_of(i.displacement) -
-                   5.3f * i.at_ends * sqrt(i.cost) - 2.42f * i.spread - 0.2f;
+                   5.3f * i.at_ends * sqrt(i.cost) - 2.42f * i.spread - 0.3f;
   return min(EVIDENCE_SCALE * i.evidence, 1.0f) / (1.0f + exponential(-log_odds));
 }
 

@@ -264,12 +264,10 @@ class Builder {
         regress(views, level == 0 ? round(i) : coarse_round(i),
                 level > 0 && i > 0 ? HELD_UNSEEN : 0, adopt);
         if (level > 0) continue;
-        repair_and_vote();
+        repair_and_vote(last);
       }
     }
-    if (options_.level_regressions.back() == 0) return;
-    merge();
-    find_normals();
+    if (options_.level_regressions.back() > 0) find_normals();
   }
 
   void find_normals() {
@@ -387,8 +385,7 @@ class Builder {
       regress(views_of(0), round(filters ? i + 1 : i), how,
               last ? until_vote() : Kernel::adopt_point, warm_regression_steps());
     }
-    repair_and_vote();
-    merge();
+    repair_and_vote(true);
   }
 
   void iterate(Views views, int iterations) {
@@ -542,15 +539,8 @@ class Builder {
            options_.vote_radius > 0;
   }
 
-  /// After everything that compares the views' planes as they came about, but for the checks. The
-  /// costs of before lie near enough.
-  void merge() {
-    if (!options_.merge_views) return;
-    add(Kernel::merge, pass_of(views_of(0)), views_of(0), 0);
-    add(Kernel::adopt_point, pass_of(views_of(0)), views_of(0), 0);
-  }
-
-  void vote() {
+  /// `costs_follow`: those of the planes that are voted for.
+  void vote(bool costs_follow) {
     if (options_.vote_radius == 0) return;
     kernel::PassParameters pass = pass_of(views_of(0));
     pass.iteration = regressions_;
@@ -558,6 +548,15 @@ class Builder {
     // In the source that tells most.
     add_with_samples(Kernel::vote, pass, views_of(0),
                      VOTE_COMPARED * kernel::samples_of_patch(VOTE_MIDDLE_RADIUS, PATTERN_DENSE));
+    if (costs_follow) {
+      add(Kernel::adopt_point, pass_of(views_of(0)), views_of(0), 0);
+    } else {
+      adopt_voted();
+    }
+  }
+
+  void merge() {
+    add(Kernel::merge, pass_of(views_of(0)), views_of(0), 0);
     adopt_voted();
   }
 
@@ -586,12 +585,17 @@ class Builder {
   }
 
   /// Lets pixels that fail the checks take the planes around them, and then the elected ones.
-  void repair_and_vote() {
-    if (options_.repair_radius == 0 && options_.vote_radius == 0) return;
-    // Samples one source once.
-    add_with_samples(Kernel::check_for_vote, pass_of(views_of(0)), views_of(0), 1);
-    fill(options_.repair_radius, reason_no_ray | reason_no_overlap | FILL_WITH_MATCHES);
-    vote();
+  /// `last`: after the last regression; then the views are merged, as nothing but the checks
+  /// compares planes as they came about any more.
+  void repair_and_vote(bool last) {
+    const bool merges = last && options_.merge_views;
+    if (options_.repair_radius > 0 || options_.vote_radius > 0) {
+      // Samples one source once.
+      add_with_samples(Kernel::check_for_vote, pass_of(views_of(0)), views_of(0), 1);
+      fill(options_.repair_radius, reason_no_ray | reason_no_overlap | FILL_WITH_MATCHES);
+      vote(merges);
+    }
+    if (merges) merge();
   }
 
   const Options& options_;

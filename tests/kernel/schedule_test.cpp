@@ -259,10 +259,10 @@ TEST(Passes, MergeTheViewsOnceAfterTheLastVoteAndBeforeNormals) {
   for (const char* preset : {"fast", "quality"}) {
     Options options = Options::preset_named(preset);
     EXPECT_THAT(around_merge(make_schedule(rig, options)),
-                ElementsAre(Kernel::vote, Kernel::adopt, Kernel::merge, Kernel::adopt_point,
+                ElementsAre(Kernel::vote, Kernel::adopt_point, Kernel::merge, Kernel::adopt,
                             Kernel::measure));
     EXPECT_THAT(around_merge(make_warm_schedule(rig, options)),
-                ElementsAre(Kernel::vote, Kernel::adopt, Kernel::merge, Kernel::adopt_point,
+                ElementsAre(Kernel::vote, Kernel::adopt_point, Kernel::merge, Kernel::adopt,
                             Kernel::structure));
     options.merge_views = false;
     EXPECT_THAT(around_merge(make_schedule(rig, options)), IsEmpty());
