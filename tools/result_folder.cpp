@@ -340,11 +340,9 @@ Json record_in(const fs::path& folder) { return json_in(folder / result_record);
 
 std::optional<double> recorded_number(const fs::path& file, const std::string& pointer) {
   const Json record = record_in(file.parent_path());
-  std::vector<std::string> files;
-  append_files(record, files);
   const Json::json_pointer at(pointer);
-  if (std::find(files.begin(), files.end(), file.filename().string()) == files.end() ||
-      !record.contains(at) || !record.at(at).is_number()) {
+  if (!view_with_file(record, file.filename().string()) || !record.contains(at) ||
+      !record.at(at).is_number()) {
     return std::nullopt;
   }
   return record.at(at).get<double>();
