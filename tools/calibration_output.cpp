@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "calibration_output.h"
 
-#include <filesystem>
-
 #include "text/lower_case.h"
 #include "widestereo/calibration.h"
 #include "widestereo/files.h"
@@ -31,7 +29,7 @@ void CalibrationOutput::require_form(const ws::Rig& rig) const { (void)text(rig)
 void CalibrationOutput::write(const ws::Rig& rig) const { ws::write_text(file, text(rig)); }
 
 std::string CalibrationOutput::text(const ws::Rig& rig) const {
-  const std::string extension = ws::lower_case(std::filesystem::path(file).extension().string());
+  const std::string extension = ws::extension_of(file);
   const std::string of_file = extension == ".json" ? basalt : extension == ".xml" ? opencv : kalibr;
   const std::string& used = format.empty() ? of_file : format;
   if (used == opencv) return ws::opencv_text(file, rig);

@@ -45,7 +45,7 @@ void add_png_scale_of_input(CLI::App& command, const std::string& option,
 }
 
 double png_scale_of(const std::string& option, std::optional<double> given, const fs::path& map) {
-  if (ws::lower_case(map.extension().string()) == ".png") {
+  if (ws::extension_of(map) == ".png") {
     if (given) return *given;
     return recorded_number(map, "/png_scale").value_or(FolderFormat::usual_png_scale);
   }

@@ -150,7 +150,7 @@ PosedImages PosedImageSettings::of_trajectory() const {
     // Of a model that is missing, lacks a file or is damaged, reading says so.
     const fs::path calibration = rig.calibration;
     if (!fs::exists(calibration) || fs::is_directory(calibration) ||
-        ws::lower_case(calibration.extension().string()) == ".json") {
+        ws::extension_of(calibration) == ".json") {
       ws::read_calibration(calibration);
     }
     throw ws::Error(rig.calibration +

@@ -336,8 +336,7 @@ class Reader {
 
 bool is_transforms_file(const fs::path& path) {
   std::error_code ignored;
-  const std::string extension = lower_case(path.extension().string());
-  if (extension != ".json" || !fs::is_regular_file(path, ignored)) return false;
+  if (extension_of(path) != ".json" || !fs::is_regular_file(path, ignored)) return false;
   FrameFinder frames;
   Json::sax_parse(TextInput(path).rest(), &frames);
   return frames.found();

@@ -96,7 +96,7 @@ void require_form(const Rig& rig, const std::vector<OpenCvForm>& forms,
 }
 
 int language_of(const std::filesystem::path& path) {
-  const std::string extension = lower_case(path.extension().string());
+  const std::string extension = extension_of(path);
   if (extension == ".xml") return cv::FileStorage::FORMAT_XML;
   return extension == ".json" ? cv::FileStorage::FORMAT_JSON : cv::FileStorage::FORMAT_YAML;
 }

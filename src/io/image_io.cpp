@@ -180,8 +180,6 @@ void encode(const fs::path& path, const cv::Mat& image, const std::vector<int>& 
   });
 }
 
-std::string extension_of(const fs::path& path) { return lower_case(path.extension().string()); }
-
 /// OpenCV keeps channels in B G R order, maps are x y z.
 cv::Mat with_channels_swapped(const cv::Mat& map) {
   if (map.channels() != 3) return map;

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 bool is_image(const fs::path& path) {
   static constexpr std::array<const char*, 9> extensions = {
       ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm", ".webp"};
-  const std::string extension = lower_case(path.extension().string());
+  const std::string extension = extension_of(path);
   return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
 }
 
