@@ -30,6 +30,7 @@ namespace {
 struct BenchmarkArguments {
   std::vector<std::string> devices;
   std::vector<std::string> presets = {"fast", "quality"};
+  std::vector<std::string> starts = {"cold"};
   std::vector<int> sizes = {256};
   std::vector<int> window_radii;
   std::optional<ws::PatchWarp> warp;
@@ -56,7 +57,8 @@ void print_header(int runs) {
       "longest, summed: its share of the device time, and which it mostly is; - where no peak is "
       "known\n"
       "(CUDA devices state them; --peak-gflops, --peak-gtexels and --peak-gbps give others).\n"
-      "device     preset    size    r       wall                              device  samples/px "
+      "device     preset   start  size    r       wall                              device  "
+      "samples/px "
       "Msamples/s  Gflop/s  Gtexel/s   GB/s  roofline              MiB\n",
       runs);
 }
@@ -68,9 +70,10 @@ void print_row(const Measurement& m) {
   const std::string of_roofline =
       share ? ws::formatted("%.1f %% of %s", 100 * *share, least.bound.c_str()) : "-";
   std::printf(
-      "%-10s %-8s %5d %4d  %9.1f [%9.1f %9.1f]  %9.1f  %8.0f  %8.1f  %8.1f  %8.2f %6.1f  %-18s "
+      "%-10s %-8s %-5s %5d %4d  %9.1f [%9.1f %9.1f]  %9.1f  %8.0f  %8.1f  %8.1f  %8.2f %6.1f  "
+      "%-18s "
       "%6.1f\n",
-      m.device.id.c_str(), m.preset.c_str(), m.size, m.window_radius, m.wall, m.wall_min,
+      m.device.id.c_str(), m.preset.c_str(), m.start(), m.size, m.window_radius, m.wall, m.wall_min,
       m.wall_max, m.on_device, work.samples / m.pixels(), m.per_second(1e-6 * work.samples),
       m.per_second(1e-9 * work.operations), m.per_second(1e-9 * work.texels),
       m.per_second(1e-9 * work.bytes), of_roofline.c_str(),
@@ -87,8 +90,8 @@ void print_row(const Measurement& m) {
 }
 
 PlotBar bar_of(const Measurement& m) {
-  return {m.device.id + "  " + m.preset + "  " + std::to_string(m.size) + " x " +
-              std::to_string(m.size),
+  return {m.device.id + "  " + m.preset + (m.warm ? "  warm  " : "  ") + std::to_string(m.size) +
+              " x " + std::to_string(m.size),
           m.wall,
           m.wall_min,
           m.wall_max,
@@ -158,11 +161,13 @@ void run_benchmark(BenchmarkArguments a) {
         options.window_radius = radius;
         for (const std::string& name : a.devices) {
           ws::Device device = ws::Device::open(name);
-          Measurement measured = measure(device, pair, options, a.runs);
-          replace(measured.device.peaks, a.peaks);
-          if (!a.as_json) print_row(measured);
-          rows.push_back(json_of(measured));
-          bars.push_back(bar_of(measured));
+          for (const std::string& start : a.starts) {
+            Measurement measured = measure(device, pair, options, start == "warm", a.runs);
+            replace(measured.device.peaks, a.peaks);
+            if (!a.as_json) print_row(measured);
+            rows.push_back(json_of(measured));
+            bars.push_back(bar_of(measured));
+          }
         }
       }
     }
@@ -185,6 +190,14 @@ void add_benchmark_command(CLI::App& app) {
   command->add_option("--presets", a->presets, "Presets (several by comma)")
       ->delimiter(',')
       ->check(CLI::IsMember(ws::Options::preset_names()))
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--starts", a->starts,
+          "Frames by themselves (cold), or from the planes of the frame before, as `sequence` "
+          "matches them, of a rig that rests (warm; both: cold,warm)")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"cold", "warm"}))
       ->capture_default_str();
   command->add_option("--sizes", a->sizes, "Sides of the square images, pixels (several by comma)")
       ->delimiter(',')

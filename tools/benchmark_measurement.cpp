@@ -12,11 +12,18 @@ using Json = nlohmann::ordered_json;
 namespace {
 
 std::vector<ws::StereoResult> results_of(ws::Matcher& matcher, const std::vector<cv::Mat>& images,
-                                         int runs) {
-  matcher.match(images);  // warm-up: compiles pipelines
+                                         bool warm, int runs) {
+  int frame = 0;
+  const auto match = [&] {
+    if (!warm) return matcher.match(images);
+    return matcher.match_next(
+        images, {.now_from_previous = Eigen::Isometry3d::Identity(), .frame = ++frame});
+  };
+  if (warm) matcher.match(images);
+  match();  // compiles pipelines
   std::vector<ws::StereoResult> results;
   for (int run = 0; run < runs; ++run) {
-    results.push_back(matcher.match(images));
+    results.push_back(match());
     results.back().views.clear();  // the maps are not needed
   }
   return results;
@@ -73,15 +80,15 @@ ws::KernelWork sum_of(const std::vector<ws::KernelTime>& kernels) {
 }
 
 Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::Options& options,
-                    int runs) {
+                    bool warm, int runs) {
   const std::vector<cv::Mat> images = {pair.views[0].image, pair.views[1].image};
   ws::Matcher matcher(device, pair.rig, options);
-  std::vector<ws::StereoResult> timed = results_of(matcher, images, runs);
+  std::vector<ws::StereoResult> timed = results_of(matcher, images, warm, runs);
   std::vector<ws::StereoResult> results = timed;
   if (device.info().type != "cpu") {
     // Where kernels need not be timed, the device need not finish each before the next.
     matcher.time_kernels(false);
-    results = results_of(matcher, images, runs);
+    results = results_of(matcher, images, warm, runs);
   }
   const auto maps = images.size();
   std::vector<double> wall;
@@ -91,6 +98,7 @@ Measurement measure(ws::Device& device, const ws::RenderedPair& pair, const ws::
   Measurement m;
   m.device = device.info();
   m.preset = options.preset;
+  m.warm = warm;
   m.size = pair.rig.views[0].camera.width;
   m.window_radius = options.window_radius;
   m.options = ws::to_json(options);
@@ -117,6 +125,7 @@ Json json_of(const Measurement& m) {
           {"name", m.device.name},
           {"driver", m.device.driver},
           {"preset", m.preset},
+          {"start", m.start()},
           {"size", m.size},
           {"window_radius", m.window_radius},
           {"options", Json::parse(m.options)},

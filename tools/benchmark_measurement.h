@@ -13,6 +13,7 @@
 struct Measurement {
   widestereo::DeviceInfo device;
   std::string preset;
+  bool warm = false;  // frames start from the planes of the one before
   int size = 0;
   int window_radius = 0;
   std::string options;                          // every parameter as JSON
@@ -22,6 +23,7 @@ struct Measurement {
   std::vector<widestereo::KernelTime> kernels;  // of the median run in which each is timed
   std::size_t device_bytes = 0;
 
+  const char* start() const { return warm ? "warm" : "cold"; }
   double pixels() const { return static_cast<double>(size) * size; }
   /// 0 where the device does not tell its time.
   double per_second(double amount) const { return on_device > 0 ? 1000 * amount / on_device : 0; }
@@ -29,8 +31,9 @@ struct Measurement {
 
 /// Matches the pair once to warm up, then `runs` times, in which each kernel is timed; on a GPU
 /// once and `runs` times more, in which none is: all times but the kernels' are of these then.
+/// `warm`: each time from the planes of the time before, as the next frame of a rig that rests.
 Measurement measure(widestereo::Device& device, const widestereo::RenderedPair& pair,
-                    const widestereo::Options& options, int runs);
+                    const widestereo::Options& options, bool warm, int runs);
 
 widestereo::KernelWork sum_of(const std::vector<widestereo::KernelTime>& kernels);
 
