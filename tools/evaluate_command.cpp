@@ -15,6 +15,7 @@
 #include "result_folder.h"
 #include "rig_settings.h"
 #include "say.h"
+#include "text/formatted.h"
 #include "white_level.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
@@ -63,6 +64,12 @@ cv::Mat read_map(const std::string& file, int values, const std::string& what,
   cv::Mat map = ws::read_map(file, png_scale);
   require_values(map, file, values, what);
   return map;
+}
+
+cv::Mat read_normals(const std::string& file) {
+  cv::Mat normals = read_map(file, 3, "a normal map");
+  require_unit_vectors(normals, file);
+  return normals;
 }
 
 /// Which view the map is of, as its name says where it is one of ours and the set has such a view;
@@ -194,92 +201,154 @@ void report_single_camera(const EvaluateArguments& a, const Json& record,
                   : "."));
 }
 
-void run_evaluate(EvaluateArguments a) {
-  const cv::Mat prediction = read_map(a.prediction, 1, "a distance map",
-                                      png_scale_of("--png-scale", a.png_scale, a.prediction));
-  const Json record = record_in(fs::path(a.prediction).parent_path());
-  choose_views(a, record, prediction.size());
-  if (!a.set.empty()) take_from_set(a);
+/// What is scored, of one size; empty what was not given.
+struct ScoredMaps {
+  cv::Mat distance, normals, confidence;
+};
+
+ScoredMaps read_scored(const EvaluateArguments& a) {
+  return {.distance = read_map(a.prediction, 1, "a distance map",
+                               png_scale_of("--png-scale", a.png_scale, a.prediction)),
+          .normals = a.normals.empty() ? cv::Mat() : read_normals(a.normals),
+          .confidence =
+              a.confidence.empty() ? cv::Mat() : read_map(a.confidence, 1, "a confidence map")};
+}
+
+ws::GroundTruth read_truth(const EvaluateArguments& a) {
   if (a.truth.empty()) throw ws::Error("Give --truth, or a folder with it by --set.");
-  if (!a.error_map.empty()) {
-    require_other_file(a.error_map,
-                       {a.prediction, a.normals, a.confidence, a.truth, a.valid, a.occlusion,
-                        a.truth_normals, a.image, a.field_of_view, a.calibration});
+  if (!a.normals.empty() && a.truth_normals.empty()) {
+    throw ws::Error("--normals needs --truth-normals, or a folder with them by --set.");
+  }
+  if (a.far_distance > 0 && a.field_of_view.empty()) {
+    throw ws::Error("--far-distance needs --field-of-view, or a folder with it by --set.");
   }
   ws::GroundTruth truth;
   truth.distance = read_map(a.truth, 1, "a distance map",
                             png_scale_of("--truth-png-scale", a.truth_png_scale, a.truth));
   if (!a.valid.empty()) truth.valid = read_labels(a.valid);
   if (!a.occlusion.empty()) truth.occlusion = read_labels(a.occlusion);
-  if (!a.truth_normals.empty()) truth.normals = read_map(a.truth_normals, 3, "a normal map");
+  if (!a.truth_normals.empty()) truth.normals = read_normals(a.truth_normals);
   if (!a.image.empty()) truth.image = read_matched_image(a);
-  if (!a.normals.empty() && a.truth_normals.empty()) {
-    throw ws::Error("--normals needs --truth-normals, or a folder with them by --set.");
-  }
-  if (a.far_distance > 0) {
-    if (a.field_of_view.empty()) {
-      throw ws::Error("--far-distance needs --field-of-view, or a folder with it by --set.");
-    }
-    truth.field_of_view = read_labels(a.field_of_view);
-  }
-  require_same_size(prediction, a.prediction, truth.distance, a.truth,
+  if (a.far_distance > 0) truth.field_of_view = read_labels(a.field_of_view);
+  return truth;
+}
+
+void require_one_size(const EvaluateArguments& a, const ScoredMaps& maps,
+                      const ws::GroundTruth& truth) {
+  require_same_size(maps.distance, a.prediction, truth.distance, a.truth,
                     "score maps that were matched at that size, without --max-image-size");
-  const cv::Mat normals = a.normals.empty() ? cv::Mat() : read_map(a.normals, 3, "a normal map");
-  const cv::Mat confidence =
-      a.confidence.empty() ? cv::Mat() : read_map(a.confidence, 1, "a confidence map");
   using OfFile = std::pair<cv::Mat, std::string>;
   for (const auto& [map, file] :
-       {OfFile(normals, a.normals), OfFile(confidence, a.confidence), OfFile(truth.valid, a.valid),
-        OfFile(truth.occlusion, a.occlusion), OfFile(truth.normals, a.truth_normals),
-        OfFile(truth.image, a.image), OfFile(truth.field_of_view, a.field_of_view)}) {
+       {OfFile(maps.normals, a.normals), OfFile(maps.confidence, a.confidence),
+        OfFile(truth.valid, a.valid), OfFile(truth.occlusion, a.occlusion),
+        OfFile(truth.normals, a.truth_normals), OfFile(truth.image, a.image),
+        OfFile(truth.field_of_view, a.field_of_view)}) {
     if (map.empty()) continue;
-    require_same_size(map, file, prediction, a.prediction, "use maps of one view");
+    require_same_size(map, file, maps.distance, a.prediction, "use maps of one view");
   }
-  const auto [rig, cameras] = cameras_of(a, record, prediction.size());
-  const int views = static_cast<int>(rig.views.size());
-  const bool is_single = views == 1 && a.view == 0 && !a.source_of_map;
-  if (is_single) {
-    report_single_camera(a, record, cameras);
-  } else if (a.view < 0 || a.view >= views || a.source < 0 || a.source >= views ||
-             a.view == a.source) {
-    throw ws::Error(cameras + " has " + std::to_string(views) +
+}
+
+/// The camera of the map, and the one in which displacements are measured, if there is another one.
+struct ScoredCameras {
+  ws::View view;
+  std::optional<ws::View> source;
+};
+
+ScoredCameras choose_cameras(const EvaluateArguments& a, const Json& record, cv::Size size) {
+  const auto [rig, name] = cameras_of(a, record, size);
+  const int count = static_cast<int>(rig.views.size());
+  if (count == 1 && a.view == 0 && !a.source_of_map) {
+    report_single_camera(a, record, name);
+    return {rig.views[0], std::nullopt};
+  }
+  if (a.view < 0 || a.view >= count || a.source < 0 || a.source >= count || a.view == a.source) {
+    throw ws::Error(name + " has " + std::to_string(count) +
                     " camera(s); choose two different ones by --view and --source.");
   }
-  if (!a.image.empty()) {
-    truth.image = stretched_within_view(truth.image, rig.views[a.view], a.image);
+  return {rig.views[a.view], rig.views[a.source]};
+}
+
+/// All that is asked for.
+struct Scores {
+  std::vector<ws::RegionScores> regions;
+  std::optional<ws::FarScores> far;
+  std::vector<ws::SparsificationPoint> sparsification;
+  std::vector<ws::ReliabilityBin> reliability;
+};
+
+Scores score(const EvaluateArguments& a, const ScoredMaps& maps, const ws::GroundTruth& truth,
+             const ScoredCameras& cameras) {
+  const auto& [view, source] = cameras;
+  Scores scores;
+  if (!source) {
+    scores.regions = ws::evaluate(maps.distance, maps.normals, truth, view);
+    return scores;
   }
-  const std::vector<ws::RegionScores> scores =
-      is_single ? ws::evaluate(prediction, normals, truth, rig.views[a.view])
-                : ws::evaluate(prediction, normals, truth, rig.views[a.view], rig.views[a.source]);
-  ws::FarScores far;
+  scores.regions = ws::evaluate(maps.distance, maps.normals, truth, view, *source);
   if (a.far_distance > 0) {
-    far = ws::far_scores(prediction, truth, rig.views[a.view], rig.views[a.source], a.far_distance);
+    scores.far = ws::far_scores(maps.distance, truth, view, *source, a.far_distance);
   }
-  if (scores.front().pixels == 0 && far.pixels == 0) {
+  if (!a.confidence.empty()) {
+    scores.sparsification =
+        ws::sparsification(maps.distance, maps.confidence, truth, view, *source);
+    scores.reliability = ws::reliability(maps.distance, maps.confidence, truth, view, *source);
+  }
+  return scores;
+}
+
+/// Throws Error where nothing is scored, and says where nothing is visible in the source, or
+/// normals face elsewhere.
+void check_scores(const EvaluateArguments& a, const Scores& scores) {
+  const std::vector<ws::RegionScores>& regions = scores.regions;
+  if (regions.front().pixels == 0 && (!scores.far || scores.far->pixels == 0)) {
     throw ws::Error("There is no pixel to score in " + a.truth +
                     ": none has a true distance and is valid; check it and --valid.");
   }
-  if (scores.size() > 1 && scores[1].region == "non-occluded" && scores[1].pixels == 0) {
+  if (regions.size() > 1 && regions[1].region == "non-occluded" && regions[1].pixels == 0) {
     say("No pixel that is scored is visible (255) in " + a.occlusion +
         ", so that there are no scores of what is not occluded.");
   }
-  std::vector<ws::SparsificationPoint> curve;
-  std::vector<ws::ReliabilityBin> bins;
-  if (!a.confidence.empty()) {
-    curve =
-        ws::sparsification(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
-    bins = ws::reliability(prediction, confidence, truth, rig.views[a.view], rig.views[a.source]);
+  if (regions.front().median_normal_angle > 90) {
+    say(
+        ws::formatted("The normals are %.0f degrees off (median): those of both files must "
+                      "face the camera, in its frame (x right, y down, z forward).",
+                      regions.front().median_normal_angle));
   }
-  if (!a.error_map.empty()) ws::write_image(a.error_map, ws::error_picture(prediction, truth));
-  if (a.as_json) {
-    std::cout << "{\"regions\": " << ws::to_json(scores)
-              << ", \"far\": " << (a.far_distance > 0 ? ws::to_json(far) : "null")
+}
+
+void print(const Scores& scores, bool as_json) {
+  const auto& [regions, far, curve, bins] = scores;
+  if (as_json) {
+    std::cout << "{\"regions\": " << ws::to_json(regions)
+              << ", \"far\": " << (far ? ws::to_json(*far) : "null")
               << ", \"sparsification\": " << ws::to_json(curve)
               << ", \"reliability\": " << ws::to_json(bins) << "}\n";
   } else {
-    std::cout << ws::to_table(scores) << (a.far_distance > 0 ? ws::to_table(far) : "")
-              << ws::to_table(curve) << ws::to_table(bins);
+    std::cout << ws::to_table(regions) << (far ? ws::to_table(*far) : "") << ws::to_table(curve)
+              << ws::to_table(bins);
   }
+}
+
+void run_evaluate(EvaluateArguments a) {
+  const ScoredMaps maps = read_scored(a);
+  const Json record = record_in(fs::path(a.prediction).parent_path());
+  choose_views(a, record, maps.distance.size());
+  if (!a.set.empty()) take_from_set(a);
+  if (!a.error_map.empty()) {
+    require_other_file(a.error_map,
+                       {a.prediction, a.normals, a.confidence, a.truth, a.valid, a.occlusion,
+                        a.truth_normals, a.image, a.field_of_view, a.calibration});
+  }
+  ws::GroundTruth truth = read_truth(a);
+  require_one_size(a, maps, truth);
+  const ScoredCameras cameras = choose_cameras(a, record, maps.distance.size());
+  if (!a.image.empty()) truth.image = stretched_within_view(truth.image, cameras.view, a.image);
+  const Scores scores = score(a, maps, truth, cameras);
+  check_scores(a, scores);
+  if (!a.error_map.empty()) {
+    ws::write_image(a.error_map, ws::error_picture(maps.distance, truth));
+  }
+  print(scores, a.as_json);
 }
 
 }  // namespace

@@ -13,3 +13,6 @@ void require_same_size(const cv::Mat& map, const std::string& name, const cv::Ma
 /// distance map", which has `count`.
 void require_values(const cv::Mat& map, const std::string& name, int count,
                     const std::string& what);
+
+/// Throws Error where vectors of a file's normal map are neither unit vectors nor zeros.
+void require_unit_vectors(const cv::Mat& normals, const std::string& name);
