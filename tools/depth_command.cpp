@@ -114,8 +114,12 @@ void run_depth(const DepthArguments& arguments) {
   if (arguments.poses.given()) contents.origin["poses"] = arguments.poses.file;
   contents.origin["white_level"] = arguments.white_level.value();
   if (!arguments.rig.masks.empty()) contents.origin["masks"] = arguments.rig.masks;
+  if (!arguments.rig.mask_folder.empty()) {
+    contents.origin["mask_folder"] = arguments.rig.mask_folder;
+  }
   const auto record = write_result_folder(arguments.output, contents, arguments.format);
-  report_little_accepted(accepted_share(run.result.views), "the order of the images");
+  report_little_accepted(accepted_share(run.result.views), overlap_share(run.result.views),
+                         "the order of the images");
   report_nearest(run.result.views, options.min_distance);
   report(record, arguments.output, arguments.as_json);
 }

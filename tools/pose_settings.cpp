@@ -96,6 +96,7 @@ ws::View posed_view(const ws::View& view, const Eigen::Isometry3d& world_from_ri
 
 void add_image_options(CLI::App& command, RigSettings& rig, PoseSettings& poses) {
   rig.add_to(command, RigSettings::or_model);
+  rig.add_mask_folder_to(command);
   poses.add_to(
       command,
       "of images taken one after the other, all by camera 0 unless --views names others; by time, "
@@ -114,14 +115,21 @@ ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
     }
     return rig_settings.images_of(*model, files);
   }
+  if (!rig_settings.mask_folder.empty()) {
+    throw ws::Error("--masks is for images of a COLMAP model or transforms.json, which " +
+                    rig_settings.calibration +
+                    " is not; give --mask, one for all images or one for each.");
+  }
   if (!pose_settings.given()) return {rig_settings.rig_for_images(files.size(), size)};
   RigSettings settings = rig_settings;
   if (settings.views.empty()) settings.views.assign(files.size(), 0);
   ws::Rig rig = settings.rig_for_images(files.size(), size);
+  std::vector<std::string> names;
+  for (const std::filesystem::path file : files) names.push_back(file.stem().string());
+  const bool of_any_clock = ws::end_in_seconds(names);
   std::vector<ws::SequenceFrame> frames;
-  for (const std::filesystem::path file : files) {
-    const std::string name = file.stem().string();
-    frames.push_back({name, {file}, ws::time_in_name(name)});
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    frames.push_back({names[i], {files[i]}, ws::time_in_name(names[i], of_any_clock)});
   }
   std::vector<std::size_t> all(frames.size());
   std::iota(all.begin(), all.end(), 0);

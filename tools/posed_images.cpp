@@ -49,10 +49,7 @@ void PosedImageSettings::add_to(CLI::App& command) {
                       FrameSettings::layouts)
       ->required();
   rig.add_to(command, RigSettings::or_model, "; by default all, or as many as --folders names");
-  command.add_option(
-      "--masks", masks,
-      "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
-      "the pixel");
+  rig.add_mask_folder_to(command);
   poses.add_to(command, "data sets of more than one frame need it", "Data sets");
   frames.add_to(command, ", and a model's images that are missing");
   size.add_to(command);
@@ -67,7 +64,7 @@ PosedImages PosedImageSettings::read(const MatchSettings& settings) const {
     const ws::CalibratedImages images_alone{.rig = {}, .in_metres = posed.in_metres};
     without_points = with_range(settings, images_alone, rig.calibration).options();
   }
-  const std::vector<bool> masked = apply_masks(posed);
+  const std::vector<bool> masked = rig.apply_mask_folder(posed.calibrated);
   posed.size = size;
   posed.white_level = white_level;
   // One mask of many images stays one in memory.
@@ -147,10 +144,11 @@ PosedImages PosedImageSettings::of_model() const {
 
 PosedImages PosedImageSettings::of_trajectory() const {
   if (!poses.given() && frames.count != 1) {
-    // Of a model that is missing, lacks a file or is damaged, reading says so.
+    // Of a model that is missing, lacks a file or is damaged, and of its files, reading says so.
     const fs::path calibration = rig.calibration;
-    if (!fs::exists(calibration) || fs::is_directory(calibration) ||
-        ws::extension_of(calibration) == ".json") {
+    const std::string extension = ws::extension_of(calibration);
+    if (!fs::exists(calibration) || fs::is_directory(calibration) || extension == ".json" ||
+        extension == ".txt" || extension == ".bin") {
       ws::read_calibration(calibration);
     }
     throw ws::Error(rig.calibration +
@@ -188,33 +186,6 @@ PosedImages PosedImageSettings::of_trajectory() const {
   posed.origin = move_near_origin(posed.calibrated);
   posed.distances = [](const Images&) { return std::nullopt; };
   return posed;
-}
-
-std::vector<bool> PosedImageSettings::apply_masks(PosedImages& posed) const {
-  std::vector<bool> masked(posed.calibrated.size());
-  if (masks.empty()) return masked;
-  if (!fs::is_directory(masks)) {
-    throw ws::Error(masks + " is no folder; give the one that holds NAME.png for the image NAME.");
-  }
-  const auto mask_of = [this](const ws::View& view) {
-    return fs::path(masks) / (view.name + ".png");
-  };
-  for (std::size_t i = 0; i < posed.calibrated.size(); ++i) {
-    ws::View& view = posed.calibrated[i];
-    const fs::path mask = mask_of(view);
-    if (!fs::exists(mask)) continue;
-    masked[i] = true;
-    add_mask(view, ws::read_mask(mask), mask.string());
-    if (cv::countNonZero(view.mask) == 0) {
-      say(mask.string() + " leaves no pixel of " + view.name + ", of which nothing is matched.");
-    }
-  }
-  const bool found = std::find(masked.begin(), masked.end(), true) != masked.end();
-  if (!found && !posed.calibrated.empty()) {
-    throw ws::Error(masks + " holds no mask of any image; there should be " +
-                    mask_of(posed.calibrated.front()).string() + ", for example.");
-  }
-  return masked;
 }
 
 void PosedImageSettings::leave_out_dark_rims(PosedImages& posed,

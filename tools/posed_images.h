@@ -46,7 +46,6 @@ struct PosedImages {
 struct PosedImageSettings {
   std::string images;  ///< folder of a model's images, or a data set
   RigSettings rig;
-  std::string masks;  ///< folder with NAME.png for the image NAME
   PoseSettings poses;
   FrameSettings frames;
   SizeSettings size;
@@ -63,8 +62,6 @@ struct PosedImageSettings {
   /// Without those whose files are missing, where they may be skipped.
   std::shared_ptr<const widestereo::SfmModel> model_of_images() const;
   PosedImages of_trajectory() const;
-  /// Which images have a mask of their own.
-  std::vector<bool> apply_masks(PosedImages& images) const;
   /// Of those that have none.
   void leave_out_dark_rims(PosedImages& images, const std::vector<bool>& masked) const;
 };

@@ -163,7 +163,7 @@ Json settings_of(const ReconstructArguments& a, const std::vector<Images>& group
           {"folders", a.images.frames.folders},
           {"calibration", absolute_path(a.images.rig.calibration)},
           {"mask", absolute_paths(a.images.rig.masks)},
-          {"masks", absolute_path(a.images.masks)},
+          {"masks", absolute_path(a.images.rig.mask_folder)},
           {"white_level", a.images.white_level.value()},
           {"max_image_size", a.images.size.value()},
           {"max_theta_degrees", a.images.rig.max_theta},
@@ -193,7 +193,7 @@ class Reconstruction {
                  {.name = ResultFolders::reconstruction,
                   .results = "images",
                   .texts = {},
-                  .numbers = {"accepted"},
+                  .numbers = {"accepted", "overlap"},
                   .files = {cloud_name, cloud_picture_name}},
                  settings_of(arguments, groups_, options_.front(), device_.info()),
                  arguments.overwrite) {}
@@ -322,6 +322,8 @@ class Reconstruction {
   /// `progress`: empty where nobody sees it.
   void match(std::size_t number, const ws::Matcher::Progress& progress) {
     const Images& group = groups_[number];
+    // Before images are read: one that takes their place later is another one.
+    const Json inputs = inputs_of(number);
     ws::Rig rig;
     std::vector<cv::Mat> pixels;
     for (const std::size_t image : group) {
@@ -344,7 +346,7 @@ class Reconstruction {
     require_no_validation_messages(device_);
     report_views_without_overlap(rig, run.result);
     for (std::size_t i = 0; i < group.size(); ++i) {
-      if (!is_matched(group[i])) write(number, i, pixels[i], run);
+      if (!is_matched(group[i])) write(group, i, inputs, pixels[i], run);
     }
     if (arguments_.as_json || progress) return;
     std::printf("group %zu of %zu: %s, %.2f s\n", number + 1, groups_.size(),
@@ -353,9 +355,8 @@ class Reconstruction {
   }
 
   /// The result of one image of a group.
-  void write(std::size_t number, std::size_t index, const cv::Mat& pixels,
+  void write(const Images& group, std::size_t index, const Json& inputs, const cv::Mat& pixels,
              const MatchingRun& group_run) {
-    const Images& group = groups_[number];
     const std::size_t image = group[index];
     const ws::Rig rig{.views = {images_.views[image]}};
     const std::vector<cv::Mat> images = {pixels};
@@ -366,8 +367,9 @@ class Reconstruction {
         {"name", images_.views[image].name},
         {"group_milliseconds", run.result.milliseconds},
         {"accepted", accepted_share(result)},
+        {"overlap", overlap_share(run.result.views)},
         {"mean_cost", ws::consistency_scores(result.differences, result.cost).mean_cost}};
-    record.update(inputs_of(number));
+    record.update(inputs);
     folders_.add(images_.views[image].name, [&](const fs::path& folder) {
       FolderContents contents{
           .rig = rig, .images = images, .run = run, .in_metres = images_.in_metres};
@@ -460,9 +462,13 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   reconstruction.run();
   const Json& record = reconstruction.folders().record();
   double accepted = 0;
-  for (const Json& image : record["images"]) accepted += image["accepted"].get<double>();
+  double overlap = 0;
+  for (const Json& image : record["images"]) {
+    accepted += image["accepted"].get<double>();
+    overlap += image["overlap"].get<double>();
+  }
   const auto count = static_cast<double>(record["images"].size());
-  report_little_accepted(accepted / count,
+  report_little_accepted(accepted / count, overlap / count,
                          reconstruction.is_of_one_frame()
                              ? "the order of the cameras"
                              : "the poses (of the camera in the world, or of the IMU)");

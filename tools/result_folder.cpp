@@ -317,7 +317,8 @@ Json record_of(const FolderContents& contents, const FolderFormat& format) {
        "plane of its own"},
       {"reasons", "bits: " + reason_bits() + ", and " + std::to_string(ws::reason_filled) +
                       " beside these where the pixel was filled; 0 = accepted; 16 bit"},
-      {"cloud", "world frame, accepted pixels"},
+      {"cloud", "world frame; pixels of distance_accepted that are not 0, row by row"},
+      {"world", contents.world},
       {"intrinsics", "pixels, by the camera model; what is 0 is left out, and a beta of 1"},
       {"world_from_camera", "X_world = [R | C] X_camera, three rows of four"},
       {"origin",

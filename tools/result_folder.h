@@ -31,9 +31,10 @@ struct FolderContents {
   const widestereo::Rig& rig;
   const std::vector<cv::Mat>& images;
   const MatchingRun& run;
-  bool in_metres = true;                              ///< else in a reconstruction's unit
-  std::vector<double> blurs = {};                     ///< pixels, one for each view, or none
-  nlohmann::ordered_json origin = {};                 ///< where the images came from
+  bool in_metres = true;               ///< else in a reconstruction's unit
+  std::vector<double> blurs = {};      ///< pixels, one for each view, or none
+  nlohmann::ordered_json origin = {};  ///< where the images came from
+  std::string world = "the frame of camera 0, or of the poses";
   std::vector<widestereo::GroundTruth> truths = {};   ///< one for each view, or none
   std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none
   /// Of the rig's frame, in that of the model or trajectory.

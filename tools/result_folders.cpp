@@ -109,7 +109,8 @@ void ResultFolders::read(const Json& settings, bool overwrite) {
     }
     return;
   }
-  const Json before = Json::parse(std::ifstream(path), nullptr, false);
+  const Json before =
+      fs::is_regular_file(path) ? Json::parse(std::ifstream(path), nullptr, false) : Json();
   const bool is_record = before.is_object() && before.value("settings", Json()).is_object() &&
                          before.value(kind_.results, Json()).is_array();
   if (!is_record ||

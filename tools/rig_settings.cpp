@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "rig_settings.h"
 
+#include <algorithm>
+#include <filesystem>
 #include <numbers>
 #include <opencv2/core.hpp>
 
@@ -13,6 +15,7 @@
 #include "widestereo/lens.h"
 
 namespace ws = widestereo;
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -92,6 +95,13 @@ void RigSettings::add_fields_of_view_to(CLI::App& command) {
       ->check(CLI::Range(1.0, 180.0));
 }
 
+void RigSettings::add_mask_folder_to(CLI::App& command) {
+  command.add_option(
+      "--masks", mask_folder,
+      "Folder of masks as COLMAP takes them: NAME.png for the image NAME, 0 = ignore "
+      "the pixel");
+}
+
 void RigSettings::add_to(CLI::App& command, const std::string& or_other, const std::string& which) {
   add_whole_rig_to(command, or_other);
   command.add_option("--views", views, "Cameras of the calibration, from 0 (by comma)" + which)
@@ -141,6 +151,7 @@ ws::CalibratedImages RigSettings::images_of(const ws::SfmModel& model,
   }
   ws::CalibratedImages images = model.calibrated_files({files.begin(), files.end()});
   limit_fields_of_view(images.rig);
+  apply_mask_folder(images.rig.views);
   return images;
 }
 
@@ -175,6 +186,34 @@ void RigSettings::limit_fields_of_view(ws::Rig& rig) const {
     const std::size_t mask = read.size() == 1 ? 0 : i;
     add_mask(view, read[mask], masks[mask]);
   }
+}
+
+std::vector<bool> RigSettings::apply_mask_folder(std::vector<ws::View>& posed) const {
+  std::vector<bool> masked(posed.size());
+  if (mask_folder.empty()) return masked;
+  if (!fs::is_directory(mask_folder)) {
+    throw ws::Error(mask_folder +
+                    " is no folder; give the one that holds NAME.png for the image NAME.");
+  }
+  const auto mask_of = [this](const ws::View& view) {
+    return fs::path(mask_folder) / (view.name + ".png");
+  };
+  for (std::size_t i = 0; i < posed.size(); ++i) {
+    ws::View& view = posed[i];
+    const fs::path mask = mask_of(view);
+    if (!fs::exists(mask)) continue;
+    masked[i] = true;
+    add_mask(view, ws::read_mask(mask), mask.string());
+    if (cv::countNonZero(view.mask) == 0) {
+      say(mask.string() + " leaves no pixel of " + view.name + ", of which nothing is matched.");
+    }
+  }
+  const bool found = std::find(masked.begin(), masked.end(), true) != masked.end();
+  if (!found && !posed.empty()) {
+    throw ws::Error(mask_folder + " holds no mask of any image; there should be " +
+                    mask_of(posed.front()).string() + ", for example.");
+  }
+  return masked;
 }
 
 bool RigSettings::looks_for_rim_of(const ws::Camera& camera) const {

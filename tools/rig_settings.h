@@ -24,6 +24,7 @@ struct RigSettings {
   std::string calibration;         ///< file, or what is_sfm_model() knows
   std::vector<int> views;          ///< cameras of the calibration; empty: the first ones
   std::vector<std::string> masks;  ///< none, one for all images or one for each
+  std::string mask_folder;         ///< with NAME.png for the view NAME
   double max_theta = 0;            ///< degrees, 0 = as calibrated, or where images end
 
   /// What read_calibration() reads.
@@ -36,6 +37,8 @@ struct RigSettings {
 
   /// Adds --mask and --max-theta.
   void add_fields_of_view_to(CLI::App& command);
+  /// Adds --masks, for images of models.
+  void add_mask_folder_to(CLI::App& command);
   /// Adds these and --calibration; `or_other`: what else it may be.
   void add_whole_rig_to(CLI::App& command, const std::string& or_other = "");
   /// Adds these and --views; `which`: what cameras it names or may leave out.
@@ -49,6 +52,9 @@ struct RigSettings {
   /// The calibrated views of its images, with masks.
   widestereo::CalibratedImages images_of(const widestereo::SfmModel& model,
                                          const std::vector<std::string>& files) const;
+
+  /// Applies --masks; tells which views have one. Throws Error where none has.
+  std::vector<bool> apply_mask_folder(std::vector<widestereo::View>& posed) const;
 
   /// Whether neither the calibration nor an option says how far a camera sees.
   bool looks_for_rim_of(const widestereo::Camera& camera) const;

@@ -43,8 +43,8 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// Of a frame, for others to be started from it or compared with it. Noise alone has up to 12 %
-/// accepted by chance, black frames nothing.
+/// Of a frame's overlap, for others to be started from it or compared with it. Noise alone has up
+/// to 12 % accepted by chance, black frames nothing.
 constexpr double least_accepted = 0.15;
 
 struct SequenceArguments {
@@ -223,11 +223,12 @@ Json settings_of(const SequenceArguments& a, const Selection& selection, const w
 /// How well a frame was matched, over all its views.
 struct Quality {
   double accepted = 0;
+  double overlap = 0;
   double mean_cost = 0;  ///< NaN where no view has a plane
 };
 
 Quality quality_of(const ws::StereoResult& result) {
-  Quality quality{.accepted = accepted_share(result.views)};
+  Quality quality{.accepted = accepted_share(result.views), .overlap = overlap_share(result.views)};
   double views = 0;
   for (const ws::ViewResult& view : result.views) {
     const double mean_cost = ws::consistency_scores(view.differences, view.cost).mean_cost;
@@ -281,6 +282,7 @@ class SequenceRun {
   };
 
   struct Frame {
+    Json input;  ///< of before the images were read
     MatchingRun run;
     std::string start = "cold";
     std::string motion;
@@ -305,7 +307,8 @@ class SequenceRun {
     }
   }
 
-  /// What a frame's record says of what it comes of.
+  /// What a frame's record says of what it comes of. From before images are read on: one that
+  /// takes their place later is another one.
   Json input_of(std::size_t index) const {
     const ws::SequenceFrame& frame = selection_.frames[index];
     Json input = {{"name", frame.name}};
@@ -316,7 +319,8 @@ class SequenceRun {
 
   /// To the frames after it: a black or blank one would spoil them, or hide a scene cut.
   static bool is_of_use(const Json& record) {
-    return record["accepted"].get<double>() >= least_accepted;
+    return accepted_of_overlap(record["accepted"].get<double>(), record["overlap"].get<double>()) >=
+           least_accepted;
   }
 
   void note_cold(const Json& record) {
@@ -326,10 +330,11 @@ class SequenceRun {
 
   void match(ws::Matcher& matcher, std::size_t index) {
     const ws::SequenceFrame& source = selection_.frames[index];
+    Frame frame;
+    frame.input = input_of(index);
     const std::vector<cv::Mat> taken = images_of(source);
     const std::vector<cv::Mat> images = blurred(taken, selection_.blurs);
     const ws::Matcher::Progress progress = bar_.part(matched_, remaining_);
-    Frame frame;
     frame.run.options = options_;
     frame.run.device = device_.info();
     ws::StereoResult& result = frame.run.result;
@@ -387,18 +392,22 @@ class SequenceRun {
     const ws::SequenceFrame& source = selection_.frames[index];
     const ws::StereoResult& result = frame.run.result;
     const Quality quality = quality_of(result);
-    Json record = input_of(index);
+    Json record = frame.input;
     record.update({{"start", frame.start},
                    {"motion", frame.motion},
                    {"milliseconds", result.milliseconds},
                    {"motion_milliseconds", frame.motion_milliseconds},
                    {"patch_samples", result.samples},
                    {"accepted", quality.accepted},
+                   {"overlap", quality.overlap},
                    {"mean_cost", quality.mean_cost}});
     note_cold(record);
     folder_.add(source.name, result.views, [&](const fs::path& folder) {
       FolderContents contents{
           .rig = selection_.rig, .images = images, .run = frame.run, .blurs = selection_.blurs};
+      contents.world =
+          "the frame of camera 0 as it took this frame; input.frame.pose, where poses are given, "
+          "leads from there to the trajectory's";
       contents.origin = folder_.origin();
       for (const fs::path& image : source.images)
         contents.origin["images"].push_back(image.string());
@@ -469,9 +478,13 @@ void run_sequence(const SequenceArguments& arguments) {
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
   double accepted = 0;
-  for (const Json& frame : run.folder().frames()) accepted += frame["accepted"].get<double>();
-  report_little_accepted(accepted / static_cast<double>(run.folder().frames().size()),
-                         "the order of the cameras");
+  double overlap = 0;
+  for (const Json& frame : run.folder().frames()) {
+    accepted += frame["accepted"].get<double>();
+    overlap += frame["overlap"].get<double>();
+  }
+  const auto count = static_cast<double>(run.folder().frames().size());
+  report_little_accepted(accepted / count, overlap / count, "the order of the cameras");
   report_poses_of_no_use(run.folder().frames());
   if (arguments.as_json) {
     std::cout << ws::to_text(run.folder().record()) << "\n";
@@ -510,12 +523,13 @@ void add_sequence_command(CLI::App& app) {
           ->excludes("--no-motion")
           ->group(start);
   command
-      ->add_option("--restart-below", a->restart_below,
-                   "Match a frame by itself when less than this share of what the last such frame "
-                   "had is accepted; 0 = never. Frames with less than " +
-                       ws::text_of(least_accepted) +
-                       " of their pixels accepted (black, blank) do not count; the next one is "
-                       "matched by itself, too")
+      ->add_option(
+          "--restart-below", a->restart_below,
+          "Match a frame by itself when less than this share of what the last such frame "
+          "had is accepted; 0 = never. Frames with less than " +
+              ws::text_of(least_accepted) +
+              " accepted of what another camera sees (black, blank) do not count; the next one is "
+              "matched by itself, too")
       ->check(CLI::Range(0.0, 1.0))
       ->excludes(no_warm_start)
       ->capture_default_str()

@@ -42,7 +42,8 @@ SequenceFolder::SequenceFolder(fs::path folder, const Json& settings, bool overw
                {.name = ResultFolders::sequence,
                 .results = "frames",
                 .texts = {"start", "motion"},
-                .numbers = {"milliseconds", "motion_milliseconds", "patch_samples", "accepted"}},
+                .numbers = {"milliseconds", "motion_milliseconds", "patch_samples", "accepted",
+                            "overlap"}},
                settings, overwrite) {}
 
 std::size_t SequenceFolder::finished(const std::vector<Json>& wanted) {

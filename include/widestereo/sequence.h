@@ -23,8 +23,13 @@ struct SequenceFrame {
 /// Nanoseconds since 1970 that the number at the end of a file's name without extension stands for,
 /// by its digits (before a point): seconds (10), milliseconds (13), microseconds (16) or
 /// nanoseconds (19). Nothing for other numbers, nor for counters, which start with 0, nor where
-/// something follows the number.
-std::optional<std::int64_t> time_in_name(const std::string& name);
+/// something follows the number. `of_any_clock`: a number of fewer digits before a point is
+/// seconds, too, as of a simulator's clock, which starts at 0.
+std::optional<std::int64_t> time_in_name(const std::string& name, bool of_any_clock = false);
+
+/// Whether the names of a set of images are of such a clock: all have a point in their last number
+/// and as many digits after it, or as many as these need, for 1.9 and 1.10 are something else.
+bool end_in_seconds(const std::vector<std::string>& names);
 
 /// Frames of a data set in the order of time, for these cameras. Layouts: FOLDER/camN/ with images,
 /// frames being those of equal names, in alphabetical order but for numbers within names, which

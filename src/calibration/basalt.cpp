@@ -3,13 +3,13 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "calibration/camera_forms.h"
 #include "calibration/formats.h"
+#include "calibration/json_document.h"
 #include "geometry/angle.h"
 #include "geometry/validation.h"
 #include "text/json_text.h"
@@ -209,26 +209,13 @@ long long time_offset_form(const Rig& rig, const std::filesystem::path& path) {
   return std::llround(offset * nanoseconds_per_second);
 }
 
-/// Throws Error where a key is there twice, of which parsers take the last one.
-Json parsed(const Document& document) {
-  std::vector<std::set<std::string>> keys;  // of the objects that are open
-  return Json::parse(document.text, [&](int, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second) {
-      document.fail("The key " + value.get<std::string>() + " is there twice", "leave one");
-    }
-    return true;
-  });
-}
-
 }  // namespace
 
 bool has_basalt_form(const Camera& camera) { return form_of(camera).has_value(); }
 
 Rig read_basalt(const Document& document) {
   try {
-    const Json root = parsed(document);
+    const Json root = parsed_json<Json>(document);
     if (!root.contains("value0")) {
       document.fail("It has no \"value0\" as a Basalt calibration has",
                     "give one, or one of the other formats");

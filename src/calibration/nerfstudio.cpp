@@ -4,14 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <string>
 #include <tuple>
 #include <utility>
 
 #include "calibration/document.h"
+#include "calibration/json_document.h"
 #include "text/file_type.h"
 #include "text/lower_case.h"
+#include "text/number.h"
 #include "text/text_input.h"
 #include "widestereo/image_io.h"
 
@@ -112,8 +115,8 @@ class Reader {
  public:
   explicit Reader(const fs::path& file) : document_{file, {}} {
     try {
-      root_ = Json::parse(TextInput(file).rest());
-    } catch (const Json::parse_error& error) {
+      root_ = parsed_json<Json>({file, TextInput(file).rest()});
+    } catch (const Json::exception& error) {
       document_.fail(std::string("It is not valid JSON (") + error.what() + ")",
                      "correct it there, or copy it again");
     }
@@ -174,7 +177,12 @@ class Reader {
   double focal_length(const Json& frame, std::size_t i, const char* key, const char* angle_key,
                       double side) const {
     if (has(frame, key) || !has(frame, angle_key)) return number(frame, i, key);
-    return side / 2 / std::tan(number(frame, i, angle_key) / 2);
+    const double angle = number(frame, i, angle_key);
+    if (!(angle > 0 && angle < std::numbers::pi)) {
+      fail(i, std::string("\"").append(angle_key).append("\" is ").append(text_of(angle)),
+           "give radians, less than pi");
+    }
+    return side / 2 / std::tan(angle / 2);
   }
 
   std::string model_name(const Json& frame, std::size_t i) const {

@@ -58,6 +58,38 @@ std::string as_opencv_yaml(const std::string& text) {
   return result;
 }
 
+/// Whether a line goes on after the mark that ends a document.
+bool goes_on_after_end(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("...") && line.find_first_not_of(" \t\r", 3) != std::string::npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Refuses what OpenCV's parsers (4.6) crash on, or never return from.
+void require_harmless(const Document& document, std::size_t first) {
+  const std::string& text = document.text;
+  const std::string damaged = "it may be damaged: copy it again";
+  const bool is_xml = first != std::string::npos && text[first] == '<';
+  if (is_xml) {
+    constexpr std::string_view end = "</opencv_storage>";
+    const std::string_view whole(text.data(), text.find_last_not_of(" \t\r\n") + 1);
+    if (!whole.ends_with(end)) {
+      document.fail(std::string("It does not end with ").append(end), damaged);
+    }
+  } else if (goes_on_after_end(text)) {
+    document.fail("It goes on in the line of the \"...\" that ends it", damaged);
+  }
+  if (text.find('\0') != std::string::npos) document.fail("It has a byte that is 0", damaged);
+  for (const char* packed : {"!!binary", "\"binary\"", "$base64$"}) {
+    if (text.find(packed) == std::string::npos) continue;
+    document.fail("It has numbers packed as base64", "have OpenCV write them as text");
+  }
+}
+
 /// The parsers call themselves at each level, until the stack is full.
 std::string parsable(const Document& document) {
   constexpr std::size_t most = 5000;  // 2 MiB of stack at 400 bytes a level
@@ -67,6 +99,7 @@ std::string parsable(const Document& document) {
                   "leave only those of the calibration");
   }
   const std::size_t first = document.text.find_first_not_of(" \t\r\n");
+  require_harmless(document, first);
   const bool is_told = first != std::string::npos &&
                        std::string_view("{<%").find(document.text[first]) != std::string::npos;
   return is_told ? document.text : as_opencv_yaml(document.text);

@@ -44,6 +44,15 @@ void require_no_part_of_a_model(const std::filesystem::path& folder) {
               ".txt is missing; give the folder that has cameras and images.");
 }
 
+void require_no_file_of_a_model(const std::filesystem::path& file) {
+  const std::string name = file.stem().string();
+  const std::filesystem::path folder = file.parent_path();
+  const bool is_part = name == "cameras" || name == "images" || name == "points3D";
+  if (!is_part || !is_sfm_model(folder)) return;
+  throw Error(file.string() + " is a file of a COLMAP model; give its folder, " +
+              (folder.empty() ? "." : folder.string()) + ".");
+}
+
 /// A model in a folder, where structure from motion usually puts it; empty where there is none.
 std::filesystem::path model_in(const std::filesystem::path& folder) {
   for (const char* place :
@@ -75,6 +84,7 @@ Document load(const std::filesystem::path& path) {
                 "`reconstruct`, `calibration check` and `view-synthesis` take it.");
   }
   require_no_part_of_a_model(path);
+  require_no_file_of_a_model(path);
   if (type == std::filesystem::file_type::directory) {
     std::error_code error;
     const std::filesystem::directory_iterator entries(path, error);

@@ -45,7 +45,14 @@ void require_single_keys(const Document& document, const YAML::Node& map,
 
 void read_yaml(const Document& document, const std::function<void(const YAML::Node& root)>& read) {
   try {
-    const YAML::Node root = YAML::Load(as_yaml(document.text));
+    std::vector<YAML::Node> documents = YAML::LoadAll(as_yaml(document.text));
+    std::erase_if(documents, [](const YAML::Node& node) { return node.IsNull(); });
+    if (documents.size() > 1) {
+      document.fail(std::to_string(documents.size()) +
+                        " YAML documents are in it, of which one would be read",
+                    "join them");
+    }
+    const YAML::Node root = documents.empty() ? YAML::Node() : documents.front();
     if (!root.IsMap()) {
       document.fail("It holds no keys such as cam0 or camera_model", "give a calibration");
     }

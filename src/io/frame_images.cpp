@@ -98,9 +98,13 @@ CameraImages by_numbers(const CameraImages& images) {
 
 /// Of one camera, in the order of time.
 std::vector<std::pair<std::int64_t, std::string>> times_of(const CameraImages& images) {
+  std::vector<std::string> names;
+  for (const auto& [key, path] : images.of_frames) names.push_back(key);
+  const bool of_any_clock = !images.listed && end_in_seconds(names);
   std::vector<std::pair<std::int64_t, std::string>> times;
-  for (const auto& [key, path] : images.of_frames) {
-    if (const auto time = time_of(images, key)) times.emplace_back(*time, key);
+  for (const std::string& key : names) {
+    const auto time = images.listed ? whole_number(key) : time_in_name(key, of_any_clock);
+    if (time) times.emplace_back(*time, key);
   }
   std::sort(times.begin(), times.end());
   return times;
@@ -146,10 +150,6 @@ std::optional<std::int64_t> whole_number(const std::string& digits) {
   const bool all_digits = !digits.empty() && std::all_of(digits.begin(), digits.end(), is_digit);
   if (!all_digits || result.ec != std::errc()) return std::nullopt;
   return value;
-}
-
-std::optional<std::int64_t> time_of(const CameraImages& images, const std::string& key) {
-  return images.listed ? whole_number(key) : time_in_name(key);
 }
 
 void match_by_numbers(std::vector<CameraImages>& cameras) {

@@ -25,9 +25,6 @@ struct CameraImages {
   bool listed = false;
 };
 
-/// When the image of that key was taken, if its key says so.
-std::optional<std::int64_t> time_of(const CameraImages& images, const std::string& key);
-
 /// Gives images the numbers in their names as keys, those that differ within their folder, as
 /// left_07 and right_07 have. Changes nothing where a folder has other names or a list.
 void match_by_numbers(std::vector<CameraImages>& cameras);

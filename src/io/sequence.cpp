@@ -5,6 +5,7 @@
 #include <array>
 #include <functional>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "io/frame_images.h"
@@ -156,6 +157,17 @@ void require_usable_names(const std::vector<SequenceFrame>& frames) {
   }
 }
 
+void take_times_from_names(std::vector<SequenceFrame>& frames) {
+  std::vector<std::string> names;
+  for (const SequenceFrame& frame : frames) {
+    if (is_complete(frame)) names.push_back(frame.name);
+  }
+  const bool of_any_clock = end_in_seconds(names);
+  for (SequenceFrame& frame : frames) {
+    frame.nanoseconds = time_in_name(frame.name, of_any_clock);
+  }
+}
+
 /// A file of one camera that is named unlike the frames, which have times, is none of them.
 void leave_out_strays(std::vector<SequenceFrame>& frames) {
   const bool are_timed = std::all_of(frames.begin(), frames.end(), [&](const SequenceFrame& frame) {
@@ -171,6 +183,34 @@ bool have_a_common_frame(const std::vector<CameraImages>& images) {
       return of_camera.of_frames.contains(image.first);
     });
   });
+}
+
+struct NumberInName {
+  std::string whole;
+  std::string fraction;  ///< after a point; empty where there is none
+};
+
+/// The digits at the end of a name.
+NumberInName number_at_end(const std::string& name) {
+  constexpr const char* digits = "0123456789";
+  const auto start_of_digits = [&](std::size_t end) {
+    const std::size_t before =
+        end == 0 ? std::string::npos : name.find_last_not_of(digits, end - 1);
+    return before == std::string::npos ? std::size_t{0} : before + 1;
+  };
+  const std::size_t start = start_of_digits(name.size());
+  const std::size_t point = start > 0 && start < name.size() ? start - 1 : std::string::npos;
+  if (point != std::string::npos && name[point] == '.' && start_of_digits(point) < point) {
+    const std::size_t first = start_of_digits(point);
+    return {name.substr(first, point - first), name.substr(start)};
+  }
+  return {name.substr(start), ""};
+}
+
+/// Of a second, in nine digits.
+std::string nanoseconds_of(std::string fraction) {
+  fraction.resize(9, '0');
+  return fraction;
 }
 
 /// The frames of all cameras together.
@@ -211,9 +251,10 @@ std::vector<SequenceFrame> frames_of(std::vector<CameraImages> images, bool allo
       frame.images.push_back(is_there ? found->second : fs::path());
     }
     frame.name = first_image(frame).stem().string();
-    frame.nanoseconds = are_listed ? whole_number(key) : time_in_name(frame.name);
+    if (are_listed) frame.nanoseconds = whole_number(key);
     frames.push_back(std::move(frame));
   }
+  if (!are_listed) take_times_from_names(frames);
   require_usable_names(frames);
   leave_out_strays(frames);
   // Fractions of a second in names are of any number of digits: 7.5 is after 7.25.
@@ -226,24 +267,12 @@ std::vector<SequenceFrame> frames_of(std::vector<CameraImages> images, bool allo
 
 }  // namespace
 
-std::optional<std::int64_t> time_in_name(const std::string& name) {
-  constexpr const char* digits = "0123456789";
-  const auto start_of_digits = [&](std::size_t end) {
-    const std::size_t before =
-        end == 0 ? std::string::npos : name.find_last_not_of(digits, end - 1);
-    return before == std::string::npos ? std::size_t{0} : before + 1;
-  };
-  std::size_t end = name.size();
-  std::size_t start = start_of_digits(end);
-  std::string fraction;
-  const std::size_t point = start > 0 && start < end ? start - 1 : std::string::npos;
-  if (point != std::string::npos && name[point] == '.' && start_of_digits(point) < point) {
-    fraction = name.substr(start);
-    end = point;
-    start = start_of_digits(end);
-  }
-  const std::string whole = name.substr(start, end - start);
+std::optional<std::int64_t> time_in_name(const std::string& name, bool of_any_clock) {
+  const auto [whole, fraction] = number_at_end(name);
   constexpr std::size_t digits_of_seconds = 10, digits_of_nanoseconds = 19;
+  if (of_any_clock && !fraction.empty() && whole.size() < digits_of_seconds) {
+    return whole_number(whole + nanoseconds_of(fraction));
+  }
   if (whole.size() < digits_of_seconds || whole.size() > digits_of_nanoseconds ||
       whole.front() == '0' || (whole.size() - digits_of_seconds) % 3 != 0) {
     return std::nullopt;
@@ -251,6 +280,18 @@ std::optional<std::int64_t> time_in_name(const std::string& name) {
   std::string nanoseconds = whole + fraction;
   nanoseconds.resize(digits_of_nanoseconds, '0');
   return whole_number(nanoseconds);
+}
+
+bool end_in_seconds(const std::vector<std::string>& names) {
+  std::set<std::size_t> lengths;
+  bool have_zeros = false;
+  for (const std::string& name : names) {
+    if (time_in_name(name) || !time_in_name(name, true)) return false;
+    const std::string fraction = number_at_end(name).fraction;
+    lengths.insert(fraction.size());
+    have_zeros = have_zeros || (fraction.size() > 1 && fraction.back() == '0');
+  }
+  return names.size() > 1 && (lengths.size() == 1 || !have_zeros);
 }
 
 bool is_complete(const SequenceFrame& frame) {

@@ -359,6 +359,26 @@ TEST(OpenCv, OfWhichAPartIsMissingIsNamed) {
   expect("%YAML:1.0\n---\n" + text.substr(rotation), "no camera matrix (K1 or M1");
 }
 
+/// OpenCV's parsers crash on such files, or never return.
+TEST(OpenCv, WhatItsParsersDoNotSurviveIsRefused) {
+  const TemporaryFolder folder;
+  const auto expect = [&folder](const std::string& name, const std::string& text,
+                                const std::string& finding) {
+    const std::string message = error_of(folder.write(name, text));
+    EXPECT_NE(message.find(finding), std::string::npos) << message;
+  };
+  const std::string xml =
+      "<?xml version=\"1.0\"?>\n<opencv_storage>\n<K1 type_id=\"opencv-matrix\"><rows>1</rows>"
+      "<cols>1</cols><dt>d</dt><data>1.</data></K1>\n</opencv_storage>\n";
+  const std::size_t inside = xml.find("type_id=") + 8;
+  expect("cut.xml", xml.substr(0, inside), "It does not end with </opencv_storage>");
+  expect("nul.xml", std::string(xml).insert(inside, 1, '\0'), "It has a byte that is 0");
+  const std::string yaml = opencv_text;
+  expect("dots.yml", replaced(yaml, "K1:", "...-\nK1:"), "It goes on in the line of the");
+  expect("binary.yml", replaced(yaml, "K1: !!opencv-matrix", "K1: !!binary |"),
+         "It has numbers packed as base64");
+}
+
 /// OpenCV's sample of calibration says what a camera is.
 TEST(OpenCv, AreFisheyesWhereTheFileSaysSo) {
   const TemporaryFolder folder;
@@ -1219,6 +1239,8 @@ TEST(BadCalibration, EveryMistakeIsNamed) {
   expect(replaced(kalibr_text, "cam1:", "cam2:"), "It has cam2 but no cam1");
   expect(replaced(kalibr_text, "cam0:", "cam2:"), "It has cam2 but no cam0");
   expect(replaced(kalibr_text, "cam1:", "cam0:"), "The key cam0 is there twice");
+  expect(replaced(kalibr_text, "cam1:", "---\ncam1:"), "2 YAML documents are in it");
+  expect(std::string(kalibr_text) + "\n...\nmore\n", "2 YAML documents are in it");
   expect(replaced(kalibr_text, "  rostopic:", "  resolution:"),
          "cam0: The key resolution is there twice");
   expect(replaced(replaced(replaced(kalibr_text, "-0.10106110275180535", "0"),

@@ -115,6 +115,21 @@ TEST_F(Nerfstudio, WhatIsNoNumberIsNotMissing) {
       << message;
 }
 
+TEST_F(Nerfstudio, WhatCannotBeMeantIsRefused) {
+  const auto expect = [this](const std::string& cameras, const std::string& finding) {
+    const std::string message = error(file(cameras, frame("a.png")));
+    EXPECT_NE(message.find(finding), std::string::npos) << message;
+  };
+  expect(R"("camera_angle_x": 90, "w": 100, "h": 80)",
+         "\"camera_angle_x\" is 90; give radians, less than pi");
+  expect(R"("w": 96, "h": 80, "fl_x": 3000, "fl_x": 30)", "The key fl_x is there twice");
+  folder_.write("transforms.json", "{\"frames\": [], \"fl_x\": 1e400}");
+  const std::string message =
+      test::error_of([&] { SfmModel model(folder_.path() / "transforms.json"); });
+  EXPECT_NE(message.find("transforms.json"), std::string::npos) << message;
+  EXPECT_NE(message.find("number overflow"), std::string::npos) << message;
+}
+
 // As exported from Project Aria's recordings.
 TEST_F(Nerfstudio, CoefficientsMayBeListed) {
   const std::string aria = R"("camera_model": "FISHEYE624", "w": 96, "h": 80)";

@@ -503,6 +503,11 @@ TEST_F(ReconstructCommand, BadInputIsRefusedBeforeAnythingIsWritten) {
   expect_error(reconstruct(), "give --min-distance and --max-distance");
   expect_error("reconstruct " + file("images") + " -c " + file("same.yaml") + " -o " + file("out"),
                "same.yaml is no COLMAP model");
+  for (const char* part : {"cameras.txt", "images.txt"}) {
+    expect_error(
+        "reconstruct " + file("images") + " -c " + file("model/") + part + " -o " + file("out"),
+        std::string(part) + " is a file of a COLMAP model; give its folder, " + file("model"));
+  }
   std::filesystem::remove(folder_ / "model/images.txt");
   expect_error(reconstruct(), "is no whole COLMAP model: images.bin or images.txt is missing");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));

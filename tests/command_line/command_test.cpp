@@ -436,7 +436,7 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
     expect_refusal(sequence() + "--no-warm-start " + option, "excludes");
   }
   cv::imwrite(file("map.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
-  cv::imwrite(file("normals.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
+  write_map(folder_ / "normals.tiff", cv::Mat(96, 96, CV_32FC3, cv::Scalar(0, 0, -1)));
   const std::string evaluate = "evaluate " + file("map.tiff") + " -c " + file("calib.yaml") +
                                " --truth " + file("map.tiff") + " ";
   expect_error(evaluate + "--normals " + file("normals.tiff"), "--truth-normals");
@@ -445,6 +445,30 @@ TEST_F(RefusedWords, OptionsHaveAnEffect) {
                 file("normals.tiff"))
                 .exit_code,
             0);
+}
+
+TEST_F(Command, NormalsMustBeUnitVectorsThatFaceTheCamera) {
+  cv::imwrite(file("map.tiff"), cv::Mat(96, 96, CV_32FC1, cv::Scalar(2.0)));
+  const std::string evaluate = "evaluate " + file("map.tiff") + " -c " + file("calib.yaml") +
+                               " --truth " + file("map.tiff") + " --normals " +
+                               file("normals.tiff") + " --truth-normals ";
+  const auto write = [this](const std::string& name, const cv::Scalar& normal) {
+    write_map(folder_ / name, cv::Mat(96, 96, CV_32FC3, normal));
+  };
+  write("normals.tiff", {0.6, 0, -0.8});
+  const Outcome right = run(evaluate + file("normals.tiff"));
+  EXPECT_EQ(right.exit_code, 0) << right.output;
+  EXPECT_EQ(right.output.find("degrees off"), std::string::npos) << right.output;
+  write("long.tiff", {0.9, 0, -1.2});
+  expect_error(evaluate + file("long.tiff"), "long.tiff has no unit vectors at 9216 of 9216");
+  // As OpenCV compresses three channels unless told otherwise.
+  cv::imwrite(file("lossy.tiff"), cv::Mat(96, 96, CV_32FC3, cv::Scalar(-0.8, 0, 0.6)));
+  expect_error(evaluate + file("lossy.tiff"), "IMWRITE_TIFF_COMPRESSION 1");
+  write("opposite.tiff", {-0.6, 0, 0.8});
+  const Outcome opposite = run(evaluate + file("opposite.tiff"));
+  EXPECT_EQ(opposite.exit_code, 0) << opposite.output;
+  EXPECT_NE(opposite.output.find("The normals are 180 degrees off"), std::string::npos)
+      << opposite.output;
 }
 
 TEST_F(Command, BlankImagesAreNamed) {
@@ -1585,6 +1609,25 @@ TEST_F(Command, BenchmarkStatesWorkAndShareOfTheRoofline) {
   // Nothing is timed, nor a header printed.
   expect_error("benchmark --devices cpu --devices nope --sizes 64", "no device \"nope\"");
   EXPECT_NE(run("benchmark --sizes 64 --plot " + file("speed.png")).exit_code, 0);
+}
+
+TEST_F(Command, BenchmarkTimesFramesThatStartFromTheOneBefore) {
+  const Outcome outcome =
+      run("benchmark --devices cpu --presets fast --sizes 64 --runs 1 --starts cold,warm --json "
+          "--plot " +
+          file("speed.svg"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const nlohmann::json rows = json_of(outcome);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_EQ(rows[0]["start"], "cold");
+  EXPECT_EQ(rows[1]["start"], "warm");
+  EXPECT_LT(rows[1]["samples_per_pixel"].get<double>(),
+            0.3 * rows[0]["samples_per_pixel"].get<double>());
+  EXPECT_TRUE(rows[1]["kernels"].contains("transfer_keep"));
+  EXPECT_FALSE(rows[1]["kernels"].contains("upsample"));
+  EXPECT_FALSE(rows[0]["kernels"].contains("transfer_keep"));
+  EXPECT_NE(bytes_of("speed.svg").find("cpu  fast  warm  64 x 64"), std::string::npos);
+  EXPECT_NE(run("benchmark --devices cpu --sizes 64 --starts tepid").exit_code, 0);
 }
 
 TEST_F(Command, HelpAndVersion) {

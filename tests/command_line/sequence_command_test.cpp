@@ -6,11 +6,13 @@
 
 #include <Eigen/Geometry>
 #include <chrono>
+#include <future>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
+#include <thread>
 
 #include "command_fixture.h"
 #include "replaced.h"
@@ -104,6 +106,36 @@ TEST_F(SequenceCommand, StartsEachFrameFromTheOneBefore) {
   EXPECT_TRUE(fs::exists(folder_ / "out/002/planes0.tiff"));
 }
 
+/// As with two lenses back to back, of which each sees little of what the other one does.
+TEST_F(SequenceCommand, LittleOverlapIsNoBadFrame) {
+  cv::Mat left = cv::Mat::zeros(96, 96, CV_8UC1);
+  cv::Mat right = left.clone();
+  left.rowRange(0, 52).setTo(255);
+  right.rowRange(40, 96).setTo(255);
+  cv::imwrite(file("left_mask.png"), left);
+  cv::imwrite(file("right_mask.png"), right);
+  const Outcome outcome =
+      run("sequence " + file("data") + " -c " + file("calib.yaml") + " -o " + file("out") +
+          " --preset fast --device cpu --min-distance 0.4 --max-distance 8 --mask " +
+          file("left_mask.png") + "," + file("right_mask.png"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("images from more places would give it one"), std::string::npos)
+      << outcome.output;
+  EXPECT_EQ(outcome.output.find("Little was accepted"), std::string::npos) << outcome.output;
+  const nlohmann::json frames = record()["frames"];
+  EXPECT_LT(frames[0]["accepted"], 0.15);
+  EXPECT_LT(frames[0]["overlap"], 0.3);
+  EXPECT_EQ(frames[1]["start"], "warm");
+  EXPECT_EQ(frames[2]["start"], "warm");
+}
+
+TEST_F(SequenceCommand, CloudsSayWhichFrameTheyAreIn) {
+  ASSERT_EQ(run(sequence() + "--clouds --count 1").exit_code, 0);
+  const auto result = nlohmann::json::parse(bytes_of("out/000/result.json"));
+  EXPECT_NE(result["conventions"]["world"].get<std::string>().find("input.frame.pose"),
+            std::string::npos);
+}
+
 TEST_F(SequenceCommand, ResumesWithTheSameBits) {
   const std::string options = "--restart-below 0 ";
   ASSERT_EQ(run(sequence("whole") + options).exit_code, 0);
@@ -173,6 +205,26 @@ TEST_F(SequenceCommand, ReplacedImagesAreMatchedAgain) {
   EXPECT_TRUE(bytes_of(folder_ / "out/000/result.json") == first);
   EXPECT_FALSE(bytes_of(folder_ / "out/001/distance0.tiff") == second);
   EXPECT_NE(outcome.output.find("(3 of 3)"), std::string::npos) << outcome.output;
+}
+
+/// Where it is replaced before it is read, or the second run finds nothing to do, as it should.
+TEST_F(SequenceCommand, ImagesReplacedWhileTheyAreMatchedAreMatchedAgain) {
+  const fs::path image = folder_ / "data/cam0/001.png";
+  cv::Mat changed = cv::imread(image.string(), cv::IMREAD_UNCHANGED);
+  cv::flip(changed, changed, 1);
+  cv::imwrite(file("changed.png"), changed);
+  std::future<Outcome> earlier = std::async(std::launch::async, [this] { return run(sequence()); });
+  const auto runs = [&earlier] {
+    return earlier.wait_for(std::chrono::milliseconds(1)) == std::future_status::timeout;
+  };
+  while (runs() && !fs::exists(folder_ / "out/000")) {
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  fs::rename(folder_ / "changed.png", image);
+  ASSERT_EQ(earlier.get().exit_code, 0);
+  ASSERT_EQ(run(sequence()).exit_code, 0);
+  ASSERT_EQ(run(sequence("fresh")).exit_code, 0);
+  expect_same_results("out", "fresh");
 }
 
 TEST_F(SequenceCommand, OtherSettingsNeedAnotherFolderOrOverwriting) {
@@ -296,6 +348,10 @@ TEST_F(SequenceCommand, DamagedRecordsAreRefusedAndDamagedFramesMatchedAgain) {
   fs::remove(folder_ / "out/000/reasons0.png");
   fs::remove_all(folder_ / "out/001");
   const nlohmann::json whole = record();
+  fs::remove(folder_ / "out/sequence.json");
+  fs::create_directory(folder_ / "out/sequence.json");
+  expect_error(sequence(), "sequence.json is no record of a sequence; remove it");
+  fs::remove(folder_ / "out/sequence.json");
   for (const char* key : {"start", "milliseconds", "name"}) {
     nlohmann::json damaged = whole;
     damaged["frames"][0].erase(key);

@@ -145,6 +145,45 @@ TEST(TimeInName, IsNoOtherNumber) {
   }
 }
 
+TEST(TimeInName, IsInSecondsOfAnyClockWhereAskedFor) {
+  EXPECT_EQ(time_in_name("7.25", true), 7'250'000'000);
+  EXPECT_EQ(time_in_name("left_100.000000001", true), 100'000'000'001);
+  EXPECT_EQ(time_in_name("0.5", true), 500'000'000);
+  EXPECT_EQ(time_in_name("1305031102.25", true), 1305031102250000000);
+  for (const char* name : {"7", "left", "7.", ".5", "7.5_left"}) {
+    EXPECT_EQ(time_in_name(name, true), std::nullopt) << name;
+  }
+}
+
+TEST(EndInSeconds, HoldsForDecimalsAlone) {
+  EXPECT_TRUE(end_in_seconds({"7.5", "7.25", "8.0"}));
+  EXPECT_TRUE(end_in_seconds({"left_100.000000000", "left_100.100000000"}));
+  EXPECT_FALSE(end_in_seconds({"1.8", "1.9", "1.10"})) << "parts of a series";
+  EXPECT_FALSE(end_in_seconds({"7.5", "8"}));
+  EXPECT_FALSE(end_in_seconds({"7.5"}));
+  EXPECT_FALSE(end_in_seconds({"1305031102.25", "1305031102.5"})) << "says so by itself";
+}
+
+TEST_F(Sequences, TimesOfClocksThatStartAtZeroHaveFractions) {
+  for (const char* name : {"7.0", "7.25", "7.5", "7.75", "8.0"}) {
+    add("cam0/" + std::string(name) + ".png");
+    add("cam1/right_" + std::string(name) + ".png");
+  }
+  for (const double tolerance : {0.0, 0.01}) {
+    const auto frames = read_sequence(folder_.path(), {0, 1}, false, tolerance);
+    EXPECT_EQ(names(frames), (std::vector<std::string>{"7.0", "7.25", "7.5", "7.75", "8.0"}));
+    EXPECT_EQ(frames[1].nanoseconds, 7'250'000'000);
+    EXPECT_EQ(frames[1].images[1], folder_ / "cam1/right_7.25.png");
+  }
+}
+
+TEST_F(Sequences, StraysAmongTimesAreLeftOut) {
+  for (const char* name : {"7.25", "7.5", "preview"}) add("cam0/" + std::string(name) + ".png");
+  for (const char* name : {"7.25", "7.5"}) add("cam1/" + std::string(name) + ".png");
+  const auto frames = read_sequence(folder_.path(), {0, 1}, true);
+  EXPECT_EQ(names(frames), (std::vector<std::string>{"7.25", "7.5"}));
+}
+
 TEST_F(Sequences, WhatIsMissingIsNamed) {
   EXPECT_THAT(error_of([&] { read_sequence(folder_ / "none", {0, 1}); }), HasSubstr("none"));
   add("cam0/0.png");
