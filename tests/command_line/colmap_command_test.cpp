@@ -92,6 +92,20 @@ TEST_F(ColmapCommand, MapsAreScoredWithTheViewsOfTheirRecord) {
   refuses("out/distance0.tiff", "", file("out/result.json") + " is damaged");
 }
 
+TEST_F(ColmapCommand, MasksAreThoseOfColmap) {
+  cv::Mat mask(96, 96, CV_8UC1, cv::Scalar(255));
+  mask.colRange(0, 48) = 0;
+  std::filesystem::create_directories(folder_ / "masks");
+  cv::imwrite(file("masks/left.png.png"), mask);
+  const Outcome outcome = run(depth("model", "masked") + "--masks " + file("masks"));
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_EQ(cv::countNonZero(distance_in("masked").colRange(0, 48)), 0);
+  EXPECT_GT(cv::countNonZero(distance_in("masked")), 1000);
+  EXPECT_EQ(record_of("masked")["input"]["mask_folder"], file("masks"));
+  expect_error(depth("same.yaml", "other") + "--masks " + file("masks"),
+               "--masks is for images of a COLMAP model");
+}
+
 TEST_F(ColmapCommand, MatchesLikeTheSameCalibrationAndCoversTheModelsPoints) {
   const Outcome colmap = run(depth("model", "colmap"));
   ASSERT_EQ(colmap.exit_code, 0) << colmap.output;
