@@ -125,6 +125,13 @@ class BinaryFile {
     require(file_.good() && static_cast<std::uint64_t>(file_.gcount()) == bytes);
   }
 
+  /// After as many records as the file states.
+  void require_end() {
+    if (file_.peek() == std::ifstream::traits_type::eof()) return;
+    throw Error(path_.string() +
+                " goes on after as many entries as it says it has; it is damaged, copy it again.");
+  }
+
   std::string where() const { return path_.string(); }
 
  private:
@@ -176,6 +183,7 @@ void read_cameras(BinaryFile file, const OnCamera& visit) {
     file.read_bytes(camera.parameters.data(), camera.parameters.size() * sizeof(double));
     visit(std::move(camera));
   }
+  file.require_end();
 }
 
 void read_images(TextFile file, const OnImage& visit) {
@@ -218,6 +226,7 @@ void read_images(BinaryFile file, const OnImage& visit) {
     }
     visit(std::move(image));
   }
+  file.require_end();
 }
 
 void read_points(TextFile file, const OnPoint& visit) {
@@ -239,6 +248,7 @@ void read_points(BinaryFile file, const OnPoint& visit) {
     file.skip(file.read<std::uint64_t>(), 2 * sizeof(std::uint32_t));
     visit(id, position);
   }
+  file.require_end();
 }
 
 template <class Read>

@@ -416,6 +416,15 @@ TEST_F(Colmap, FilesThatCannotBeReadOnAreNoShorterOnes) {
   EXPECT_NE(error().find("images.txt: Input/output error"), std::string::npos) << error();
 }
 
+TEST_F(Colmap, BinaryFilesEndWithTheirLastEntry) {
+  const std::string more = " goes on after as many entries as it says it has";
+  write_binary(cameras_binary() + "x");
+  EXPECT_NE(error().find("cameras.bin" + more), std::string::npos) << error();
+  // One image less than there are.
+  write_binary(cameras_binary(), bytes(std::uint64_t{2}) + images_binary().substr(8));
+  EXPECT_NE(error().find("images.bin" + more), std::string::npos) << error();
+}
+
 TEST_F(Colmap, EveryTruncatedBinaryFileIsAnError) {
   const std::string cameras = cameras_binary(), images = images_binary();
   for (std::size_t size = 0; size < cameras.size(); ++size) {
