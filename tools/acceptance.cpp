@@ -43,6 +43,12 @@ double overlap_share(const std::vector<ws::ViewResult>& views) {
   });
 }
 
+double mean_in(const nlohmann::ordered_json& records, const char* key) {
+  double sum = 0;
+  for (const auto& record : records) sum += record[key].get<double>();
+  return sum / static_cast<double>(records.size());
+}
+
 double accepted_of_overlap(double accepted, double overlap) {
   constexpr double least_overlap = 0.05;  // of rigs; less comes of a wrong calibration
   return accepted / std::max(overlap, least_overlap);

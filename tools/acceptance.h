@@ -2,6 +2,7 @@
 // How much of a match was accepted, and what it means.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ double accepted_share(const std::vector<widestereo::ViewResult>& views);
 /// Likewise what another view sees, with texture, within the range of distances, which alone can be
 /// accepted.
 double overlap_share(const std::vector<widestereo::ViewResult>& views);
+/// Of one number in the records of results.
+double mean_in(const nlohmann::ordered_json& records, const char* key);
 /// How much of what can be accepted is.
 double accepted_of_overlap(double accepted, double overlap);
 

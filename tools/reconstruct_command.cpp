@@ -461,14 +461,9 @@ void run_reconstruct(const ReconstructArguments& arguments) {
   Reconstruction reconstruction(arguments);
   reconstruction.run();
   const Json& record = reconstruction.folders().record();
-  double accepted = 0;
-  double overlap = 0;
-  for (const Json& image : record["images"]) {
-    accepted += image["accepted"].get<double>();
-    overlap += image["overlap"].get<double>();
-  }
-  const auto count = static_cast<double>(record["images"].size());
-  report_little_accepted(accepted / count, overlap / count,
+  const Json& images = record["images"];
+  const double accepted = mean_in(images, "accepted");
+  report_little_accepted(accepted, mean_in(images, "overlap"),
                          reconstruction.is_of_one_frame()
                              ? "the order of the cameras"
                              : "the poses (of the camera in the world, or of the IMU)");
@@ -476,8 +471,8 @@ void run_reconstruct(const ReconstructArguments& arguments) {
     std::cout << ws::to_text(record) << "\n";
     return;
   }
-  std::printf("%.0f images, %.1f %% accepted on average; %zu points in %s\n", count,
-              100 * accepted / count, record["cloud"]["points"].get<std::size_t>(),
+  std::printf("%zu images, %.1f %% accepted on average; %zu points in %s\n", images.size(),
+              100 * accepted, record["cloud"]["points"].get<std::size_t>(),
               (reconstruction.folders().folder() / cloud_name).string().c_str());
 }
 

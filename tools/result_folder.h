@@ -34,9 +34,9 @@ struct FolderContents {
   bool in_metres = true;               ///< else in a reconstruction's unit
   std::vector<double> blurs = {};      ///< pixels, one for each view, or none
   nlohmann::ordered_json origin = {};  ///< where the images came from
-  std::string world = "the frame of camera 0, or of the poses";
-  std::vector<widestereo::GroundTruth> truths = {};   ///< one for each view, or none
-  std::vector<widestereo::RegionScores> scores = {};  ///< of view 0, or none
+  std::string world = "the frame of camera 0, or of the poses";  ///< what it is, in words
+  std::vector<widestereo::GroundTruth> truths = {};              ///< one for each view, or none
+  std::vector<widestereo::RegionScores> scores = {};             ///< of view 0, or none
   /// Of the rig's frame, in that of the model or trajectory.
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
 };

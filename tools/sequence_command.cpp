@@ -477,14 +477,8 @@ void run_sequence(const SequenceArguments& arguments) {
   arguments.format.require_room_for(options.min_distance, options.max_distance);
   SequenceRun run(arguments, select_frames(arguments));
   run.run();
-  double accepted = 0;
-  double overlap = 0;
-  for (const Json& frame : run.folder().frames()) {
-    accepted += frame["accepted"].get<double>();
-    overlap += frame["overlap"].get<double>();
-  }
-  const auto count = static_cast<double>(run.folder().frames().size());
-  report_little_accepted(accepted / count, overlap / count, "the order of the cameras");
+  report_little_accepted(mean_in(run.folder().frames(), "accepted"),
+                         mean_in(run.folder().frames(), "overlap"), "the order of the cameras");
   report_poses_of_no_use(run.folder().frames());
   if (arguments.as_json) {
     std::cout << ws::to_text(run.folder().record()) << "\n";

@@ -157,6 +157,7 @@ void require_usable_names(const std::vector<SequenceFrame>& frames) {
   }
 }
 
+/// All by one kind of clock.
 void take_times_from_names(std::vector<SequenceFrame>& frames) {
   std::vector<std::string> names;
   for (const SequenceFrame& frame : frames) {
@@ -205,12 +206,6 @@ NumberInName number_at_end(const std::string& name) {
     return {name.substr(first, point - first), name.substr(start)};
   }
   return {name.substr(start), ""};
-}
-
-/// Of a second, in nine digits.
-std::string nanoseconds_of(std::string fraction) {
-  fraction.resize(9, '0');
-  return fraction;
 }
 
 /// The frames of all cameras together.
@@ -270,15 +265,14 @@ std::vector<SequenceFrame> frames_of(std::vector<CameraImages> images, bool allo
 std::optional<std::int64_t> time_in_name(const std::string& name, bool of_any_clock) {
   const auto [whole, fraction] = number_at_end(name);
   constexpr std::size_t digits_of_seconds = 10, digits_of_nanoseconds = 19;
-  if (of_any_clock && !fraction.empty() && whole.size() < digits_of_seconds) {
-    return whole_number(whole + nanoseconds_of(fraction));
-  }
-  if (whole.size() < digits_of_seconds || whole.size() > digits_of_nanoseconds ||
-      whole.front() == '0' || (whole.size() - digits_of_seconds) % 3 != 0) {
+  const bool is_short = of_any_clock && !fraction.empty() && whole.size() < digits_of_seconds;
+  if (!is_short && (whole.size() < digits_of_seconds || whole.size() > digits_of_nanoseconds ||
+                    whole.front() == '0' || (whole.size() - digits_of_seconds) % 3 != 0)) {
     return std::nullopt;
   }
+  const std::size_t missing = is_short ? digits_of_seconds - whole.size() : 0;
   std::string nanoseconds = whole + fraction;
-  nanoseconds.resize(digits_of_nanoseconds, '0');
+  nanoseconds.resize(digits_of_nanoseconds - missing, '0');
   return whole_number(nanoseconds);
 }
 
