@@ -10,6 +10,7 @@
 #include "calibration_fit.h"
 #include "geometry/angle.h"
 #include "rig_settings.h"
+#include "say.h"
 #include "text/formatted.h"
 #include "text/json_text.h"
 #include "widestereo/calibration.h"
@@ -123,12 +124,41 @@ std::string limit_of_lens(double max_theta_degrees) {
   return ws::formatted("%.1f (lens)", max_theta_degrees);
 }
 
+/// Says of what is hardly ever so but in a damaged or mistyped calibration. `view` as described.
+void report_unusual(const nlohmann::ordered_json& view) {
+  constexpr double narrow = 5;       // degrees
+  constexpr double stretched = 1.5;  // pixels of one side, as a multiple of the other's
+  const auto number = [&view](const char* key) { return view[key].get<double>(); };
+  const std::string name = view["name"].get<std::string>();
+  const double ratio = number("fx") / number("fy");
+  if (std::max(ratio, 1 / ratio) > stretched) {
+    say(name + ws::formatted(": fx is %.3g times fy; are its pixels that far from square?", ratio));
+  }
+  const auto is_outside = [](double centre, double side) {
+    return centre < -0.5 || centre > side - 0.5;
+  };
+  if (is_outside(number("cx"), number("width")) || is_outside(number("cy"), number("height"))) {
+    say(name + ws::formatted(": the principal point (%.1f, %.1f) lies outside the image of %g x %g "
+                             "pixels; is it of a crop?",
+                             number("cx"), number("cy"), number("width"), number("height")));
+  }
+  const double widest = std::max({number("horizontal_field_of_view_degrees"),
+                                  number("vertical_field_of_view_degrees"),
+                                  number("diagonal_field_of_view_degrees")});
+  if (widest < narrow) {
+    say(name + ws::formatted(": the field of view is %.2g degrees at most; is the focal length in "
+                             "pixels?",
+                             widest));
+  }
+}
+
 void show(const ShowArguments& arguments) {
   const ws::Calibration calibration = ws::read_calibration(arguments.file);
   const std::vector<ws::View>& views = calibration.rig.views;
   report_long_baseline(calibration.rig);
   nlohmann::ordered_json json = {{"file", arguments.file}, {"format", name_of(calibration.format)}};
   for (const ws::View& view : views) json["views"].push_back(describe(view));
+  for (const auto& view : json["views"]) report_unusual(view);
   json["pairs"] = nlohmann::json::array();
   for (std::size_t i = 0; i < views.size(); ++i) {
     for (std::size_t j = i + 1; j < views.size(); ++j) {

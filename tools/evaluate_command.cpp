@@ -16,6 +16,7 @@
 #include "rig_settings.h"
 #include "say.h"
 #include "text/formatted.h"
+#include "text/number.h"
 #include "white_level.h"
 #include "widestereo/calibration.h"
 #include "widestereo/error.h"
@@ -47,6 +48,11 @@ struct EvaluateArguments {
 /// With the white level that the map was matched with, where none is given.
 cv::Mat read_matched_image(const EvaluateArguments& a) {
   const double recorded = recorded_number(a.prediction, "/input/white_level").value_or(0);
+  const bool is_level = recorded >= WhiteLevel::lowest && recorded <= WhiteLevel::highest;
+  if (!is_level && recorded != 0) {
+    throw ws::Error("The record beside " + a.prediction + " has the white level " +
+                    ws::text_of(recorded) + ", which no camera has; give --white-level.");
+  }
   return a.white_level.read(a.image, static_cast<int>(recorded));
 }
 
@@ -331,7 +337,12 @@ void print(const Scores& scores, bool as_json) {
 
 void run_evaluate(EvaluateArguments a) {
   const ScoredMaps maps = read_scored(a);
-  const Json record = record_in(fs::path(a.prediction).parent_path());
+  const fs::path folder = fs::path(a.prediction).parent_path();
+  const Json record = record_in(folder);
+  if (record.is_discarded()) {
+    throw ws::Error((folder / result_record).string() +
+                    " beside the map is damaged; match again, or move the map elsewhere.");
+  }
   choose_views(a, record, maps.distance.size());
   if (!a.set.empty()) take_from_set(a);
   if (!a.error_map.empty()) {

@@ -94,12 +94,11 @@ void require_not_among(const std::filesystem::path& output,
   for (const std::filesystem::path& folder : folders) require_other_folder(output, folder);
 }
 
-void require_different_cameras(std::vector<int> cameras) {
+void require_different_cameras(std::vector<int> cameras, const std::string& remedy) {
   std::sort(cameras.begin(), cameras.end());
   const auto twice = std::adjacent_find(cameras.begin(), cameras.end());
   if (twice == cameras.end()) return;
-  throw ws::Error("--views names camera " + std::to_string(*twice) +
-                  " twice, which has one image of each frame; name it once.");
+  throw ws::Error("--views names camera " + std::to_string(*twice) + " twice, " + remedy + ".");
 }
 
 void require_different_images(const std::vector<std::filesystem::path>& images) {

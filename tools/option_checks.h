@@ -40,8 +40,11 @@ void require_other_folder(const std::filesystem::path& output, const std::filesy
 /// Throws Error where the output would lie among images, and be taken for some by the next run.
 void require_not_among(const std::filesystem::path& output,
                        const std::vector<std::filesystem::path>& images);
-/// Throws Error where --views names a camera twice: of one frame it has one image.
-void require_different_cameras(std::vector<int> cameras);
+/// Throws Error where --views names a camera twice: of one frame it has one image. `remedy`: what
+/// the message goes on with.
+void require_different_cameras(
+    std::vector<int> cameras,
+    const std::string& remedy = "which has one image of each frame; name it once");
 
 /// Throws Error where an image is given twice: it would match itself at any distance.
 void require_different_images(const std::vector<std::filesystem::path>& images);

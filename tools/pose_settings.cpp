@@ -120,7 +120,11 @@ ws::CalibratedImages calibrated_images(const RigSettings& rig_settings,
                     rig_settings.calibration +
                     " is not; give --mask, one for all images or one for each.");
   }
-  if (!pose_settings.given()) return {rig_settings.rig_for_images(files.size(), size)};
+  if (!pose_settings.given()) {
+    require_different_cameras(rig_settings.views,
+                              "from one place; name another, or give --poses if it has moved");
+    return {rig_settings.rig_for_images(files.size(), size)};
+  }
   RigSettings settings = rig_settings;
   if (settings.views.empty()) settings.views.assign(files.size(), 0);
   ws::Rig rig = settings.rig_for_images(files.size(), size);

@@ -29,7 +29,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-/// Discarded where there is no such file.
+/// Null where there is no such file, discarded where it is damaged.
 Json json_in(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return Json();
@@ -123,6 +123,15 @@ void move_result(const fs::path& from, const fs::path& to, const Json& record) {
   }
 }
 
+/// Throws an exception of JSON's where it is no number that an int holds.
+int whole_number(const Json& value) {
+  const auto number = value.get<std::int64_t>();
+  if (number != static_cast<int>(number) || value != number) {
+    throw std::out_of_range(value.dump() + " is no whole number of ordinary size");
+  }
+  return static_cast<int>(number);
+}
+
 /// As ViewWriter describes it.
 ws::View view_in(const Json& record) {
   ws::View view;
@@ -132,8 +141,8 @@ ws::View view_in(const Json& record) {
   int number = 0;
   while (to_string(static_cast<ws::CameraModel>(number)) != model) ++number;
   camera.model = static_cast<ws::CameraModel>(number);
-  camera.width = record.at("width");
-  camera.height = record.at("height");
+  camera.width = whole_number(record.at("width"));
+  camera.height = whole_number(record.at("height"));
   camera.max_theta = record.at("max_theta_degrees").get<double>() * ws::radians_per_degree;
   const Json& intrinsics = record.at("intrinsics");
   for (const auto& [name, member] : ws::intrinsics()) {
@@ -369,7 +378,7 @@ ws::Rig rig_in(const Json& record, const std::string& name) {
   ws::Rig rig;
   try {
     for (const Json& view : views_of(record)) rig.views.push_back(view_in(view));
-  } catch (const std::exception&) {  // JSON's own, and of unknown models
+  } catch (const std::exception&) {  // JSON's own, of sizes and of unknown models
     throw ws::Error(name + " is damaged or of another version; give --calibration.");
   }
   ws::validate(rig, name);

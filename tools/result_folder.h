@@ -41,7 +41,7 @@ struct FolderContents {
   Eigen::Vector3d world_origin = Eigen::Vector3d::Zero();
 };
 
-/// The record in a result folder; discarded where there is none.
+/// The record in a result folder: null where there is none, discarded where it is damaged.
 nlohmann::ordered_json record_in(const std::filesystem::path& folder);
 /// What the record beside a file, which names it among its files, has at a JSON pointer, such as
 /// "/input/white_level"; none where there is no number.

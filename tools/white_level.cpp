@@ -13,7 +13,7 @@ void WhiteLevel::add_to(CLI::App& command) {
   command
       .add_option("--white-level", value_,
                   "Largest value of the camera where 16-bit images hold fewer bits: 4095 for 12")
-      ->check(CLI::Range(255, 65535));
+      ->check(CLI::Range(lowest, highest));
 }
 
 cv::Mat WhiteLevel::read(const std::filesystem::path& file, int otherwise) const {

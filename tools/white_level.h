@@ -8,6 +8,7 @@
 
 class WhiteLevel {
  public:
+  static constexpr int lowest = 255, highest = 65535;
   /// Adds --white-level.
   void add_to(CLI::App& command);
   /// As ws::read_image(), stretched to all of 16 bits where a level is given. Where none is, says

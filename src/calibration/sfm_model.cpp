@@ -261,14 +261,15 @@ class SfmModel::Implementation {
       for (std::size_t i = 0; i < images.size(); ++i) {
         for (const std::uint64_t number : images[i].points) observers[number].push_back(i);
       }
-      calibration::each_colmap_point(file,
-                                     [&](std::uint64_t number, const Eigen::Vector3d& position) {
-                                       const auto observed = observers.find(number);
-                                       if (observed == observers.end()) return;
-                                       if (!position.allFinite()) return;
-                                       all.positions.emplace(number, position);
-                                       points.push_back({position, std::move(observed->second)});
-                                     });
+      calibration::each_colmap_point(
+          file, [&](std::uint64_t number, const Eigen::Vector3d& position) {
+            const auto observed = observers.find(number);
+            if (observed == observers.end()) return;
+            if (!position.allFinite()) return;
+            const bool is_new = all.positions.emplace(number, position).second;
+            if (!is_new) refuse_two(file, "points", number);
+            points.push_back({position, std::move(observed->second)});
+          });
     }
     all.selection = ViewSelection(std::move(centres), std::move(points));
     return all;

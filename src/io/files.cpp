@@ -66,6 +66,7 @@ class TemporaryFile {
 Error cannot_write(const fs::path& path, int error) {
   std::string remedy = "check permissions and free space";
   if (error == ENAMETOOLONG) remedy = "choose a shorter one";
+  if (error == ELOOP) remedy = "its symbolic links lead in a circle, choose another name";
   if (error == ENOSPC || error == EDQUOT || error == EFBIG) {
     remedy = "make room, or write elsewhere";
   }

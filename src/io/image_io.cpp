@@ -64,6 +64,8 @@ bool begins_with(std::span<const uchar> bytes, std::initializer_list<uchar> head
   return bytes.size() >= head.size() && std::equal(head.begin(), head.end(), bytes.begin());
 }
 
+bool is_png(std::span<const uchar> bytes) { return begins_with(bytes, {0x89, 'P', 'N', 'G'}); }
+
 bool is_jpeg(std::span<const uchar> bytes) { return begins_with(bytes, {0xff, 0xd8, 0xff}); }
 
 /// Big-endian, of 2 or 4 bytes.
@@ -111,9 +113,21 @@ bool is_whole_jpeg(std::span<const uchar> bytes) {
 /// Decoders fill the missing part of a truncated PNG or JPEG silently. What follows the end is none
 /// of it: cameras append data.
 bool is_truncated(std::span<const uchar> bytes) {
-  if (begins_with(bytes, {0x89, 'P', 'N', 'G'})) return !is_whole_png(bytes);
+  if (is_png(bytes)) return !is_whole_png(bytes);
   if (is_jpeg(bytes)) return !is_whole_jpeg(bytes);
   return false;
+}
+
+/// PNGs of few bytes may hold more pixels than memory does: their header alone is read.
+void require_usable_size(std::span<const uchar> bytes, const fs::path& path) {
+  constexpr std::size_t width_at = 16,
+                        height_at = 20;  // of the first chunk, which a PNG begins with
+  if (!is_png(bytes)) return;
+  const std::size_t width = number_at(bytes, width_at, 4);
+  const std::size_t height = number_at(bytes, height_at, 4);
+  if (std::max(width, height) <= largest_image_side) return;
+  throw Error(path.string() + " is " + std::to_string(width) + "x" + std::to_string(height) +
+              " pixels; reduce it to sides of at most " + std::to_string(largest_image_side) + ".");
 }
 
 /// `kind` and `formats`: what the file should be.
@@ -121,6 +135,7 @@ cv::Mat decode(const std::vector<uchar>& bytes, const fs::path& path, const std:
                const std::string& formats) {
   if (bytes.empty()) throw Error(path.string() + " is empty; give an image file.");
   if (is_truncated(bytes)) throw Error(path.string() + " is truncated or damaged; copy it again.");
+  require_usable_size(bytes, path);
   cv::Mat image;
   try {
     image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <optional>
 #include <sstream>
 
@@ -44,6 +46,17 @@ std::vector<std::string> words_of(const std::string& line, bool comma_separated)
 bool is_comma_separated(const std::string& line) {
   const std::size_t after = line.find_first_not_of(space, line.find_first_of(" \t\r,"));
   return after != std::string::npos && line[after] == ',';
+}
+
+/// Whether a line begins with a letter and none of its words is a number, not even NaN.
+bool names_columns(const std::string& line) {
+  const std::vector<std::string> words = words_of(line, line.find(',') != std::string::npos);
+  return std::isalpha(static_cast<unsigned char>(line.front())) != 0 &&
+         std::none_of(words.begin(), words.end(), [](const std::string& word) {
+           char* end = nullptr;
+           std::strtod(word.c_str(), &end);
+           return *end == '\0';
+         });
 }
 
 /// The last letters of the columns' names, before their units, in lower case.
@@ -95,7 +108,7 @@ class PoseLine {
   StampedPose pose(const std::string& line, const std::string& where) const {
     const std::vector<std::string> words = words_of(line, comma_separated_);
     if (words.size() != columns_) {
-      throw Error(where + " has " + std::to_string(words.size()) + " numbers instead of " +
+      throw Error(where + " has " + std::to_string(words.size()) + " value(s) instead of " +
                   std::to_string(columns_) + "; a pose is " + form_ + ".");
     }
     std::array<double, numbers_of_pose> v{};
@@ -217,7 +230,8 @@ Trajectory read_trajectory(const std::filesystem::path& path) {
   for (int number = 1; file.next_line(line); ++number) {
     const std::size_t first = line.find_first_not_of(space);
     if (first == std::string::npos) continue;
-    if (line[first] == '#') {
+    // Tables of other programs name their columns without it.
+    if (line[first] == '#' || (!layout && names_columns(line.substr(first)))) {
       if (!layout) comments.push_back(line);
       continue;
     }

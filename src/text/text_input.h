@@ -17,8 +17,12 @@ namespace widestereo {
 /// A text file, past the byte order mark that some editors begin it with.
 class TextInput {
  public:
-  /// Throws Error where it cannot be opened.
+  /// Throws Error where it cannot be opened, or is a device, which may have no end.
   explicit TextInput(std::filesystem::path path) : path_(std::move(path)) {
+    std::error_code ignored;  // what cannot be opened is refused next
+    if (std::filesystem::is_character_file(path_, ignored)) {
+      throw Error(path_.string() + " is a device; give a file or a pipe.");
+    }
     errno = 0;
     stream_.open(path_, std::ios::binary);
     if (!stream_) fail();

@@ -485,12 +485,16 @@ TEST_F(Colmap, SurplusParametersAreErrors) {
   EXPECT_EQ(error(), "");
 }
 
-TEST_F(Colmap, NumbersOfCamerasAndImagesAreThereOnce) {
+TEST_F(Colmap, NumbersAreThereOnce) {
   write_text(cameras_text + std::string("7 SIMPLE_RADIAL 1000 800 950 500 400 -0.1\n"));
   EXPECT_NE(error().find("cameras.txt has two cameras of the number 7"), std::string::npos)
       << error();
   write_text(cameras_text, images_text + std::string("\n\n4 1 0 0 0 0 0 0 7 left/c.png\n\n"));
   EXPECT_NE(error().find("images.txt has two images of the number 4"), std::string::npos)
+      << error();
+  write_text(cameras_text, "4 1 0 0 0 0 0 0 7 left/b.png\n1 2 8\n");
+  folder_.write("points3D.txt", "8 0 0 5 9 9 9 0.5 4 0\n8 0 0 6 9 9 9 0.5 4 0\n");
+  EXPECT_NE(error().find("points3D.txt has two points of the number 8"), std::string::npos)
       << error();
 }
 

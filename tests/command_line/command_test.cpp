@@ -160,6 +160,30 @@ TEST_F(Command, SharesOfNoPixelAreUnknown) {
             std::string::npos);
 }
 
+TEST_F(Command, DamagedRecordsBesideMapsAreNamed) {
+  ASSERT_EQ(run(depth_of("left.png", "right.png")).exit_code, 0);
+  fs::rename(folder_ / "out", folder_ / "result");
+  const nlohmann::json whole = nlohmann::json::parse(bytes_of("result/result.json"));
+  const std::string evaluate =
+      "evaluate " + file("result/distance0.tiff") + " --truth " + file("result/distance0.tiff");
+  EXPECT_EQ(run(evaluate).exit_code, 0);
+  folder_.write("result/result.json", "{\"views\": [");
+  expect_error(evaluate, "result.json beside the map is damaged; match again");
+  constexpr std::int64_t beyond_ints = (std::int64_t{1} << 40) + 96;
+  for (const nlohmann::json& width : {nlohmann::json(96.5), nlohmann::json(1e30),
+                                      nlohmann::json(beyond_ints), nlohmann::json("96")}) {
+    nlohmann::json damaged = whole;
+    damaged["views"][0]["width"] = width;
+    folder_.write("result/result.json", damaged.dump());
+    expect_error(evaluate, "result.json is damaged or of another version; give --calibration");
+  }
+  nlohmann::json damaged = whole;
+  damaged["input"]["white_level"] = 1e300;
+  folder_.write("result/result.json", damaged.dump());
+  expect_error(evaluate + " --image " + file("left.png"),
+               "has the white level 1e+300, which no camera has; give --white-level.");
+}
+
 /// The pair of calib.yaml, taken by its first camera alone in two places.
 class MovingCamera : public Command {
  protected:
@@ -278,6 +302,8 @@ TEST_F(Command, BadCalibrationsAndOptionsAreNamed) {
   expect_error(depth_of("left.png", "right.png", "none.yaml"), "none.yaml");
   expect_error(depth_of("left.png", "right.png") + "--views 0,5", "camera 5");
   expect_error(depth_of("left.png", "right.png") + "--views 0", "--views");
+  expect_error(depth_of("left.png", "right.png") + "--views 1,1",
+               "--views names camera 1 twice, from one place; name another, or give --poses");
   const std::string plain = "depth " + file("left.png") + " " + file("right.png") + " -c " +
                             file("calib.yaml") + " -o " + file("out") + " --device cpu";
   expect_error(plain + " --min-distance -1", "distance range");
@@ -1001,6 +1027,25 @@ cam1:
   EXPECT_NEAR(pair["rotation_degrees"], 90, 1e-9);
   EXPECT_NEAR(pair["direction_in_first"][0], 1, 1e-12);
   EXPECT_NEAR(pair["direction_in_first"][1], 0, 1e-12);
+}
+
+TEST_F(Command, CalibrationShowAsksAboutWhatIsUnusual) {
+  const auto said_of = [this](const std::string& intrinsics) {
+    folder_.write("c.yaml", "cam0:\n  camera_model: pinhole\n  intrinsics: [" + intrinsics +
+                                "]\n  distortion_model: none\n  distortion_coeffs: []\n"
+                                "  resolution: [300, 200]\n");
+    const Outcome outcome = run("calibration show " + file("c.yaml"));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+    return outcome.output;
+  };
+  EXPECT_THAT(said_of("150, 150, 149.5, 99.5"), Not(HasSubstr("?")));
+  EXPECT_THAT(said_of("150, 110, 0, 199"), Not(HasSubstr("?")));
+  EXPECT_THAT(said_of("300, 150, 149.5, 99.5"), HasSubstr("cam0: fx is 2 times fy; "));
+  EXPECT_THAT(said_of("150, 300, 149.5, 99.5"), HasSubstr("cam0: fx is 0.5 times fy; "));
+  EXPECT_THAT(said_of("150, 150, 149.5, 200"),
+              HasSubstr("the principal point (149.5, 200.0) lies outside the image of 300 x 200"));
+  EXPECT_THAT(said_of("1e6, 1e6, 149.5, 99.5"),
+              HasSubstr("the field of view is 0.021 degrees at most"));
 }
 
 TEST_F(Command, DarkRimsAreLeftOut) {

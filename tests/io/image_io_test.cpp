@@ -462,6 +462,19 @@ TEST(BadFiles, DamagedChunksOfPngAreNoticed) {
   }
 }
 
+/// Of one colour: few bytes.
+TEST(BadFiles, PngsOfTooManyPixelsAreNotDecoded) {
+  const TemporaryFolder folder;
+  const auto error = [&](cv::Size size) {
+    cv::imwrite((folder / "i.png").string(), cv::Mat::zeros(size, CV_8UC1));
+    return error_of([&] { read_image(folder / "i.png"); });
+  };
+  EXPECT_EQ(error({16384, 1}), "");
+  EXPECT_EQ(error({16385, 2}), (folder / "i.png").string() +
+                                   " is 16385x2 pixels; reduce it to sides of at most 16384.");
+  EXPECT_NE(error({2, 16385}).find("is 2x16385 pixels"), std::string::npos);
+}
+
 /// Stands for a full disk: files cannot grow beyond `bytes`.
 class FileSizeLimit {
  public:

@@ -503,7 +503,7 @@ TEST_F(Trajectories, BrokenLinesAreNamed) {
   EXPECT_THAT(error_of_text(""), HasSubstr("poses.txt; give a TUM trajectory"));
   EXPECT_THAT(error_of([&] { read_trajectory(folder_.path()); }),
               HasSubstr(folder_.path().string() + " are a folder; give the file in it."));
-  EXPECT_THAT(error_of_text("#\n1 2 3 4 0 0 0\n"), HasSubstr("line 2 has 7 numbers"));
+  EXPECT_THAT(error_of_text("#\n1 2 3 4 0 0 0\n"), HasSubstr("line 2 has 7 value(s)"));
   EXPECT_THAT(error_of_text("1 2 3 4 0 0 0 1 5\n"), HasSubstr("line 1"));
   for (const char* no_number : {"nan", "inf", "1e999", "+-5", "+", "0x10", "5m"}) {
     EXPECT_THAT(error_of_text("1 2 " + std::string(no_number) + " 4 0 0 0 1\n"),
@@ -522,6 +522,23 @@ TEST_F(Trajectories, BrokenLinesAreNamed) {
   EXPECT_EQ(error_of_text("# this is how we now have what we saw\n1 2 3 4 0 0 0 1\n"), "");
 }
 
+TEST_F(Trajectories, MayNameTheirColumnsWithoutASign) {
+  EXPECT_EQ(error_of_text("timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n"), "");
+  EXPECT_EQ(error_of_text("nanoseconds, px,py,pz,qw,qx,qy,qz\n1,2,3,4,1,0,0,0\n"), "");
+  EXPECT_THAT(error_of_text("timestamp tx ty tz qw qx qy qz\n1 2 3 4 1 0 0 0\n"),
+              HasSubstr("write qx qy qz qw."));
+  EXPECT_THAT(error_of_text("t,x,y,z,qx,qy,qz,qw\n1,2,3,4,0,0,0,1\n"),
+              HasSubstr("write qw,qx,qy,qz"));
+  EXPECT_THAT(error_of_text("nan nan nan nan 0 0 0 1\n1 2 3 4 0 0 0 1\n"), HasSubstr("line 1"));
+  EXPECT_THAT(error_of_text("1 2 3 4 0 0 0 1\ntimestamp tx ty tz qx qy qz qw\n"),
+              HasSubstr("line 2"));
+}
+
+TEST_F(Trajectories, OfDevicesAreRefused) {
+  EXPECT_EQ(error_of([] { read_trajectory("/dev/zero"); }),
+            "/dev/zero is a device; give a file or a pipe.");
+}
+
 TEST_F(Trajectories, BrokenLinesOfGroundTruthAreNamed) {
   const std::string header = "#timestamp [ns], p_x, p_y, p_z, q_RS_w [], q_x, q_y, q_RS_z []\n";
   const std::string whole = header + "1403636579763555584,1,2,3,0.5,0.5,-0.5,0.5,9\r\n";
@@ -534,14 +551,14 @@ TEST_F(Trajectories, BrokenLinesOfGroundTruthAreNamed) {
   expect(header, "no poses");
   expect(header + "\r\n \r\n", "no poses");
   expect(whole + "1403636579768555520,1,2,3,0.5,0.5,-0.5,0.5\n",
-         "line 3 has 8 numbers instead of 9");
-  expect(whole + "14036365", "line 3 has 1 numbers instead of 9");
-  expect("1,2,3,4,1,0,0\n", "line 1 has 7 numbers instead of 8; a pose is \"nanoseconds,px");
-  expect("1,2,3,4,1,0,0,\n", "line 1 has 7 numbers");
+         "line 3 has 8 value(s) instead of 9");
+  expect(whole + "14036365", "line 3 has 1 value(s) instead of 9");
+  expect("1,2,3,4,1,0,0\n", "line 1 has 7 value(s) instead of 8; a pose is \"nanoseconds,px");
+  expect("1,2,3,4,1,0,0,\n", "line 1 has 7 value(s)");
   expect("1,2,,4,1,0,0,0\n", "line 1 is no \"nanoseconds,px,py,pz,qw,qx,qy,qz\" of finite");
   expect("1,2,nan,4,1,0,0,0\n", "finite");
   expect("1,2,3,4 m,1,0,0,0\n", "finite");
-  expect(whole + "1 2 3 4 0 0 0 1\n", "line 3 has 1 numbers instead of 9");
+  expect(whole + "1 2 3 4 0 0 0 1\n", "line 3 has 1 value(s) instead of 9");
   expect("1,2,3,4,0,0,0,0\n", "line 1 has a quaternion of length 0");
   expect("1,2,3,4,1,1,0,0\n", "quaternion of length 1.4");
   expect("1,2,3,4,0,0,0,1e-9\n",
