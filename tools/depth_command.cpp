@@ -45,6 +45,18 @@ struct DepthArguments {
   bool as_json = false;
 };
 
+/// What joins an image of a model, by the points that they share, or else by the range.
+std::vector<std::filesystem::path> sources_of(const DepthArguments& arguments,
+                                              const ws::SfmModel& model, const std::string& image) {
+  const auto count = static_cast<std::size_t>(arguments.sources.value_or(default_sources));
+  if (model.has_points()) return model.source_files(image, count);
+  const ws::CalibratedImages without_points{.rig = {}, .in_metres = false};
+  const ws::Options options =
+      with_range(arguments.settings, without_points, arguments.rig.calibration).options();
+  return model.source_files(image, count,
+                            {.nearest = options.min_distance, .farthest = options.max_distance});
+}
+
 /// One image is joined by the best ones of its COLMAP model.
 std::vector<std::string> files_of(const DepthArguments& arguments,
                                   const std::optional<ws::SfmModel>& model) {
@@ -66,13 +78,12 @@ std::vector<std::string> files_of(const DepthArguments& arguments,
     const cv::Size size = ws::read_image(files.front()).size();
     ws::read_calibration(arguments.rig.calibration, size);
     throw ws::Error(
-        "One image is not enough, unless --calibration is a COLMAP model to choose "
-        "others from; give two or more.");
+        "One image is not enough, unless --calibration is a COLMAP model or transforms.json to "
+        "choose others from; give two or more.");
   }
-  const auto sources = model->source_files(
-      files.front(), static_cast<std::size_t>(arguments.sources.value_or(default_sources)));
+  const auto sources = sources_of(arguments, *model, files.front());
   if (sources.empty()) {
-    throw ws::Error(arguments.rig.calibration + " has no image that shares points with " +
+    throw ws::Error(arguments.rig.calibration + " has no image that sees the same as " +
                     files.front() + "; give two or more images.");
   }
   for (const auto& source : sources) files.push_back(source.string());

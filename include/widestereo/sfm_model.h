@@ -86,8 +86,18 @@ class SfmModel {
   /// in by its name. Throws Error as image_of() does.
   std::vector<std::filesystem::path> source_files(const std::filesystem::path& file,
                                                   std::size_t count) const;
+  /// The same by the range of distances alone, in the model's unit, where it has no points: those
+  /// that see most of what may lie there (assumed_points()), of the 63 images taken nearest to it.
+  std::vector<std::filesystem::path> source_files(const std::filesystem::path& file,
+                                                  std::size_t count,
+                                                  const DistanceRange& range) const;
 
  private:
+  /// Those of images, in the folder of images in which that image's file lies by its name.
+  std::vector<std::filesystem::path> files_beside(const std::filesystem::path& file,
+                                                  std::size_t image,
+                                                  const std::vector<std::size_t>& others) const;
+
   class Implementation;
   std::unique_ptr<Implementation> implementation_;
 };

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -172,6 +173,21 @@ class SfmModel::Implementation {
                 "); give images that it has, in their folder.");
   }
 
+  /// All, from the nearest to that image on, which comes first.
+  std::vector<std::size_t> images_from(std::size_t number) const {
+    const auto centre = [this](std::size_t image) -> Eigen::Vector3d {
+      return images_[image].camera_from_world.inverse().translation();
+    };
+    std::vector<double> distances;
+    for (std::size_t i = 0; i < images_.size(); ++i) {
+      distances.push_back(i == number ? -1 : (centre(i) - centre(number)).norm());
+    }
+    std::vector<std::size_t> sorted(images_.size());
+    std::iota(sorted.begin(), sorted.end(), 0);
+    std::ranges::stable_sort(sorted, {}, [&](std::size_t image) { return distances[image]; });
+    return sorted;
+  }
+
   View view(std::size_t number) const {
     const ColmapImage& image = image_at(number);
     const auto camera = cameras_.find(image.camera);
@@ -324,12 +340,33 @@ CalibratedImages SfmModel::calibrated_files(const std::vector<fs::path>& files) 
 
 std::vector<fs::path> SfmModel::source_files(const fs::path& file, std::size_t count) const {
   const std::size_t image = image_of(file);
-  const fs::path images = folder_of_images(file, names()[image]);
-  std::vector<fs::path> sources;
-  for (const std::size_t source : selection().sources(image, count)) {
-    sources.push_back(images / names()[source]);
+  return files_beside(file, image, selection().sources(image, count));
+}
+
+std::vector<fs::path> SfmModel::source_files(const fs::path& file, std::size_t count,
+                                             const DistanceRange& range) const {
+  constexpr std::size_t most = 64;  // images of which assumed_points() lists all that see a point
+  std::vector<std::size_t> nearest = implementation_->images_from(image_of(file));
+  nearest.resize(std::min(nearest.size(), most));
+  std::vector<View> views;
+  std::vector<Eigen::Vector3d> centres;
+  for (const std::size_t image : nearest) {
+    views.push_back(view(image));
+    centres.push_back(views.back().world_from_camera.translation());
   }
-  return sources;
+  const ViewSelection seen(std::move(centres),
+                           assumed_points(views, range.nearest, range.farthest));
+  std::vector<std::size_t> sources;
+  for (const std::size_t source : seen.sources(0, count)) sources.push_back(nearest[source]);
+  return files_beside(file, nearest.front(), sources);
+}
+
+std::vector<fs::path> SfmModel::files_beside(const fs::path& file, std::size_t image,
+                                             const std::vector<std::size_t>& others) const {
+  const fs::path folder = folder_of_images(file, names()[image]);
+  std::vector<fs::path> files;
+  for (const std::size_t other : others) files.push_back(file_of(other, folder));
+  return files;
 }
 
 }  // namespace widestereo

@@ -272,6 +272,21 @@ TEST_F(Colmap, NamesAreOfFilesWithinAFolder) {
   }
 }
 
+TEST_F(Colmap, SourcesWithoutPointsAreThoseNearbyThatLookTheSameWay) {
+  const std::string pose = " 1 0 0 0 ";
+  // a.png looks along z from the origin, far.png along the same way from beside it, back.png from
+  // nearer the other way; "away" is too far off to see anything of the range.
+  write_text("1 OPENCV_FISHEYE 640 480 300 300 320 240 0 0 0 0\n",
+             "1" + pose + "0 0 0 1 left/a.png\n\n2 0 0 1 0 0.1 0 0 1 left/back.png\n\n3" + pose +
+                 "-0.4 0 0 1 right/far.png\n\n4" + pose + "-900 0 0 1 right/away.png\n\n");
+  const SfmModel model(folder_.path());
+  ASSERT_FALSE(model.has_points());
+  using Files = std::vector<fs::path>;
+  EXPECT_EQ(model.source_files("/data/left/a.png", 2, {.nearest = 2, .farthest = 4}),
+            Files{"/data/right/far.png"});
+  EXPECT_EQ(model.source_files("/data/left/a.png", 2), Files{});
+}
+
 /// Points 10 in front of the camera of left/a.png. Of the others, "near" is 0.03 beside it, "far"
 /// 0.9 and "few" too; "none" sees other points.
 TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {

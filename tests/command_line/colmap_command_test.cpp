@@ -138,7 +138,7 @@ TEST_F(ColmapCommand, OneImageIsJoinedByTheBestOthers) {
   expect_error("depth " + file("l.png") + " -c " + file("same.yaml") + " -o " + file("out"),
                file("l.png"));
   expect_error("depth " + file("away.png") + " -c " + file("model") + " -o " + file("out"),
-               "no image that shares points");
+               "no image that sees the same as ");
 }
 
 TEST_F(ColmapCommand, RangesGivenCountMore) {
@@ -665,6 +665,23 @@ TEST_F(TransformsCommand, TakesATransformsFile) {
   EXPECT_EQ(record_of("out/left.png")["conventions"]["unit"], "that of the reconstruction");
   expect_error("calibration show " + file("images/transforms.json"),
                "is a COLMAP model or transforms.json");
+}
+
+TEST_F(TransformsCommand, OneImageIsJoinedByThoseThatSeeTheSameInTheRange) {
+  write_transforms("images/transforms.json", "left.png", "right/1.png");
+  const std::string left = file("images/left.png"), right = file("images/right/1.png");
+  const auto depth_of_images = [&](const std::string& second, const std::string& output) {
+    return test::replaced(
+        test::replaced(depth("images/transforms.json", output), file("left.png"), left),
+        file("right.png"), second);
+  };
+  expect_error(depth_of_images("", "out"), "give --min-distance and --max-distance");
+  for (const auto& [second, output] : {std::pair<std::string, std::string>("", "one"),
+                                       std::pair<std::string, std::string>(right, "both")}) {
+    const Outcome outcome = run(depth_of_images(second, output) + range);
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  }
+  EXPECT_TRUE(same_bits(distance_in("one"), distance_in("both")));
 }
 
 TEST_F(TransformsCommand, AMaskOfOneImageLeavesTheRimsOfOthers) {
