@@ -49,11 +49,11 @@ struct EvaluateArguments {
 cv::Mat read_matched_image(const EvaluateArguments& a) {
   const double recorded = recorded_number(a.prediction, "/input/white_level").value_or(0);
   const bool is_level = recorded >= WhiteLevel::lowest && recorded <= WhiteLevel::highest;
-  if (!is_level && recorded != 0) {
+  if (!is_level && recorded != 0 && a.white_level.value() == 0) {
     throw ws::Error("The record beside " + a.prediction + " has the white level " +
                     ws::text_of(recorded) + ", which no camera has; give --white-level.");
   }
-  return a.white_level.read(a.image, static_cast<int>(recorded));
+  return a.white_level.read(a.image, is_level ? static_cast<int>(recorded) : 0);
 }
 
 /// One for each pixel, in an 8-bit grey image: as GroundTruth has them.

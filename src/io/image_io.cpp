@@ -75,13 +75,16 @@ std::size_t number_at(std::span<const uchar> bytes, std::size_t position, std::s
   return number;
 }
 
-/// Whether all chunks are there up to the last one, those that matter undamaged.
+/// Whether all chunks are there, from the header up to the last one, those that matter undamaged.
 bool is_whole_png(std::span<const uchar> bytes) {
+  constexpr std::size_t of_header = 13;
   constexpr std::size_t signature = 8, around_data = 12;  // length, type and CRC of a chunk
   for (std::size_t at = signature; at + around_data <= bytes.size();) {
     const std::size_t length = number_at(bytes, at, 4);
     if (length > bytes.size() - at - around_data) return false;
     const auto type_and_data = bytes.subspan(at + 4, length + 4);
+    const bool is_header = begins_with(type_and_data, {'I', 'H', 'D', 'R'}) && length == of_header;
+    if (at == signature && !is_header) return false;
     const bool is_critical = type_and_data[0] >= 'A' && type_and_data[0] <= 'Z';
     const auto crc = crc32_z(0, type_and_data.data(), type_and_data.size());
     if (is_critical && crc != number_at(bytes, at + 8 + length, 4)) return false;
@@ -118,13 +121,13 @@ bool is_truncated(std::span<const uchar> bytes) {
   return false;
 }
 
-/// PNGs of few bytes may hold more pixels than memory does: their header alone is read.
+/// PNGs of few bytes may hold more pixels than memory does: of those, which must be whole, the
+/// header alone is read.
 void require_usable_size(std::span<const uchar> bytes, const fs::path& path) {
-  constexpr std::size_t width_at = 16,
-                        height_at = 20;  // of the first chunk, which a PNG begins with
+  constexpr std::size_t header_at = 16;
   if (!is_png(bytes)) return;
-  const std::size_t width = number_at(bytes, width_at, 4);
-  const std::size_t height = number_at(bytes, height_at, 4);
+  const std::size_t width = number_at(bytes, header_at, 4);
+  const std::size_t height = number_at(bytes, header_at + 4, 4);
   if (std::max(width, height) <= largest_image_side) return;
   throw Error(path.string() + " is " + std::to_string(width) + "x" + std::to_string(height) +
               " pixels; reduce it to sides of at most " + std::to_string(largest_image_side) + ".");

@@ -182,6 +182,12 @@ TEST_F(Command, DamagedRecordsBesideMapsAreNamed) {
   folder_.write("result/result.json", damaged.dump());
   expect_error(evaluate + " --image " + file("left.png"),
                "has the white level 1e+300, which no camera has; give --white-level.");
+  const cv::Mat left = cv::imread(file("left.png"));
+  cv::Mat deep;
+  left.convertTo(deep, CV_16U, 16);
+  cv::imwrite(file("deep.png"), deep);
+  const Outcome given = run(evaluate + " --white-level 4095 --image " + file("deep.png"));
+  EXPECT_EQ(given.exit_code, 0) << given.output;
 }
 
 /// The pair of calib.yaml, taken by its first camera alone in two places.

@@ -462,6 +462,17 @@ TEST(BadFiles, DamagedChunksOfPngAreNoticed) {
   }
 }
 
+TEST(BadFiles, PngsWithoutAHeaderAreDamaged) {
+  const TemporaryFolder folder;
+  write_image(folder / "i.png", cv::Mat::zeros(8, 8, CV_8UC1));
+  const std::string whole = bytes_of(folder / "i.png");
+  const std::string signature_and_end = whole.substr(0, 8) + whole.substr(whole.size() - 12);
+  EXPECT_NE(error_of([&] {
+              read_image(folder.write("e.png", signature_and_end));
+            }).find("e.png is truncated or damaged"),
+            std::string::npos);
+}
+
 /// Of one colour: few bytes.
 TEST(BadFiles, PngsOfTooManyPixelsAreNotDecoded) {
   const TemporaryFolder folder;
