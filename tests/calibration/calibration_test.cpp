@@ -719,11 +719,9 @@ TEST_F(OmnidirSamples, NoXiIsOverlooked) {
   EXPECT_NE(second.find("xi without its matrix"), std::string::npos) << second;
 }
 
-TEST(OpenCv, ReadsRationalAndPrismCoefficientsInItsOrder) {
+Camera camera_with_opencv_coefficients(const std::vector<double>& d) {
   const TemporaryFolder folder;
   const auto path = folder / "mono.yml";
-  const std::vector<double> d = {0.51,  -0.61, 0.0006, -0.0002, 0.52,  0.39,
-                                 -0.43, 0.45,  0.001,  -0.002,  0.003, -0.004};
   const cv::Matx33d k(600, 0, 320, 0, 601, 240, 0, 0, 1);
   {
     cv::FileStorage file(path.string(), cv::FileStorage::WRITE);
@@ -731,14 +729,30 @@ TEST(OpenCv, ReadsRationalAndPrismCoefficientsInItsOrder) {
     file << "image_width" << 640 << "image_height" << 480;
   }
   const Camera c = read_calibration(path).rig.views[0].camera;
-  EXPECT_EQ(c.model, CameraModel::pinhole_rational);
-  const std::vector<cv::Point3d> point = {{0.3, -0.2, 1}};
   std::vector<cv::Point2d> expected;
-  cv::projectPoints(point, cv::Vec3d(), cv::Vec3d(), k, d, expected);
+  cv::projectPoints(std::vector<cv::Point3d>{{0.3, -0.2, 1}}, cv::Vec3d(), cv::Vec3d(), k, d,
+                    expected);
   Eigen::Vector2d pixel;
-  ASSERT_TRUE(project(c, {0.3, -0.2, 1}, pixel));
+  EXPECT_TRUE(project(c, {0.3, -0.2, 1}, pixel));
   EXPECT_NEAR(pixel.x(), expected[0].x, 1e-9);
   EXPECT_NEAR(pixel.y(), expected[0].y, 1e-9);
+  return c;
+}
+
+TEST(OpenCv, ReadsRationalAndPrismCoefficientsInItsOrder) {
+  const Camera c = camera_with_opencv_coefficients(
+      {0.51, -0.61, 0.0006, -0.0002, 0.52, 0.39, -0.43, 0.45, 0.001, -0.002, 0.003, -0.004});
+  EXPECT_EQ(c.model, CameraModel::pinhole_rational);
+}
+
+TEST(OpenCv, EachRationalAndPrismCoefficientCounts) {
+  for (std::size_t i = 5; i < 12; ++i) {
+    SCOPED_TRACE(i);
+    std::vector<double> d(12);
+    d[0] = 0.1;
+    d[i] = 0.02;
+    EXPECT_EQ(camera_with_opencv_coefficients(d).model, CameraModel::pinhole_rational);
+  }
 }
 
 /// What would be dropped must not be there.

@@ -110,6 +110,8 @@ TEST(Epipolar, TellsHowManyMatchesAreOffAndHowManyLieBehind) {
     std::swap(matches[i].first, matches[i].second);
   }
   EXPECT_EQ(check_epipolar(rig.views[0], rig.views[1], matches).behind, 0.25);
+  EXPECT_FALSE(lie_behind({.behind = 0.45}));
+  EXPECT_TRUE(lie_behind({.behind = 0.55}));
 }
 
 TEST(Epipolar, DistancesAreFromTheFirstCameraHoweverTheSecondIsTurned) {
@@ -334,6 +336,18 @@ TEST(Range, OfDistancesIsCheckedByFeatures) {
     EXPECT_EQ(report(0.1, 0.3).farther, 500);
     EXPECT_EQ(report(0.1, 0.3).nearer, 0);
   }
+}
+
+TEST(Range, EndsWithoutAPercentOfOutliers) {
+  const Rig rig = rig_with_rotation_error(0);
+  std::vector<PixelMatch> matches = matches_at(rig, 2, 300);
+  for (const double distance : {0.6, 8.0}) {
+    const std::vector<PixelMatch> outliers = matches_at(rig, distance, 2);
+    matches.insert(matches.end(), outliers.begin(), outliers.end());
+  }
+  const RangeReport report = check_range(rig.views[0], rig.views[1], matches, 0.1, 100);
+  EXPECT_NEAR(report.nearest, 2, 1e-6);
+  EXPECT_NEAR(report.farthest, 2, 1e-6);
 }
 
 TEST(Range, IsNotToldByWhatDoesNotFitTheCalibration) {

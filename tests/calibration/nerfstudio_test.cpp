@@ -71,6 +71,12 @@ TEST_F(Nerfstudio, InstantNgpsWordsAreKnown) {
   EXPECT_EQ(seen.camera.model, CameraModel::kannala_brandt);
   EXPECT_NEAR(seen.camera.fx, 50, 1e-9);
   EXPECT_NEAR(seen.camera.fy, 50, 1e-9);
+  const Camera both = view(file(R"("camera_angle_x": 1.5707963267948966, "w": 100, "h": 80,
+                                  "camera_angle_y": 1.5707963267948966)",
+                                frame("a.png")))
+                          .camera;
+  EXPECT_NEAR(both.fx, 50, 1e-9);
+  EXPECT_NEAR(both.fy, 40, 1e-9);
   // Its other lenses have such an angle in their files, too.
   const std::string pinhole = R"("camera_angle_x": 1.5, "w": 100, "h": 80, )";
   for (const char* lens : {R"("ftheta_p1": 0.001)", R"("latlong": true)"}) {

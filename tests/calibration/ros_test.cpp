@@ -129,6 +129,23 @@ TEST(Ros, ReadsMessages) {
   }
 }
 
+TEST(Ros, CamerasMayStandAboveEachOther) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 2; ++i) {
+    const cv::Matx34d projection(280, 0, 420, 0, 0, 280, 398, -28 * i, 0, 0, 1, 0);
+    folder.write("cam" + std::to_string(i) + ".yaml",
+                 "image_width: 848\nimage_height: 800\ndistortion_model: equidistant\n" +
+                     matrix("camera_matrix", left_matrix) +
+                     matrix("distortion_coefficients", lens.t()) +
+                     matrix("rectification_matrix", cv::Matx33d::eye()) +
+                     matrix("projection_matrix", projection));
+  }
+  const Rig rig = read_calibration(folder.path()).rig;
+  ASSERT_EQ(rig.views.size(), 2u);
+  EXPECT_LT((rig.views[1].world_from_camera.translation() - Eigen::Vector3d(0, 0.1, 0)).norm(),
+            1e-12);
+}
+
 TEST(Ros, ReadsOneCameraOfEachModel) {
   const TemporaryFolder folder;
   const auto camera = [&](const std::string& model, const std::string& coefficients) {

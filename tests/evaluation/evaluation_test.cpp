@@ -115,6 +115,9 @@ TEST_F(FourPixels, MissingNormalsDoNotCount) {
   const RegionScores all = evaluate(truth_.distance, normals, truth_, reference_, source_)[0];
   EXPECT_NEAR(all.mean_normal_angle, 30, 1e-4);
   EXPECT_NEAR(all.median_normal_angle, 20, 1e-4);
+  truth_.normals.at<cv::Vec3f>(0, 3) = {0, 0, 0};
+  EXPECT_NEAR(evaluate(truth_.distance, normals, truth_, reference_, source_)[0].mean_normal_angle,
+              15, 1e-4);
 }
 
 TEST_F(FourPixels, ThePixelOnTheAxisIsWithin30Degrees) {
@@ -396,7 +399,7 @@ TEST(Evaluation, TruthScoresPerfectlyInEveryBand) {
 
 TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   const cv::Mat cost = (cv::Mat_<float>(1, 4) << 0.1f, 0.3f, 0.1f, 2);
-  cv::Mat differences(1, 4, CV_32FC2, cv::Scalar(0, 0));
+  cv::Mat differences(1, 4, CV_32FC2, cv::Scalar(0.019, 1.9));
   differences.at<cv::Vec2f>(0, 1) = {0.01f, 1.5f};
   differences.at<cv::Vec2f>(0, 2) = {1000, 1000};
   const ConsistencyScores s = consistency_scores(differences, cost);
@@ -405,6 +408,9 @@ TEST(Evaluation, ConsistencyScoresCountPixelsWithAPlane) {
   EXPECT_NEAR(s.consistent_pixels, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.low_cost, 2 / 3.0, 1e-9);
   EXPECT_NEAR(s.mean_cost, 0.5 / 3, 1e-6);
+  differences.at<cv::Vec2f>(0, 0) = {0.021f, 2.1f};
+  EXPECT_NEAR(consistency_scores(differences, cost).consistent_relative, 1 / 3.0, 1e-9);
+  EXPECT_NEAR(consistency_scores(differences, cost).consistent_pixels, 1 / 3.0, 1e-9);
   const ConsistencyScores of_none =
       consistency_scores(differences, cv::Mat(1, 4, CV_32FC1, cv::Scalar(2)));
   EXPECT_EQ(of_none.pixels, 0);
@@ -553,6 +559,10 @@ TEST_F(FourPixels, ReliabilityIsOfBinsThatBeginWithTheirLowerEnd) {
   EXPECT_THAT(
       to_table(bins),
       ::testing::HasSubstr("0.50 to 0.70      50.0%      0.500     50.0% |     75.0%     66.7%\n"));
+  // Of 3 pixels at 0.5 and more, 1 is right now, whatever the confidences say.
+  distance.row(0).colRange(1, 3).setTo(1);
+  EXPECT_THAT(to_table(reliability(distance, confidence, truth_, reference_, source_)),
+              ::testing::HasSubstr("     50.0% |     75.0%     33.3%\n"));
   truth_.distance.setTo(0);
   EXPECT_EQ(to_table(reliability(distance, confidence, truth_, reference_, source_)), "");
 }

@@ -710,6 +710,7 @@ TEST(RayImage, HonoursTheMask) {
   EXPECT_EQ(rays.at<cv::Vec4f>(250, 200)[3], 0);
   EXPECT_GT(cv::norm(rays.at<cv::Vec4f>(250, 200)), 0.99) << "masked pixels keep their ray";
   EXPECT_EQ(rays.at<cv::Vec4f>(250, 300)[3], 1);
+  EXPECT_EQ(cv::norm(rays, ray_image(camera, mask & 1), cv::NORM_INF), 0) << "of zeros and ones";
 }
 
 TEST(CameraValidation, NamesWhatIsWrong) {
@@ -739,6 +740,12 @@ TEST(CameraValidation, NamesWhatIsWrong) {
                   "beta"));
   EXPECT_TRUE(has(message([](Camera& c) { c.model = CameraModel::field_of_view; }), "omega"));
   EXPECT_TRUE(has(message([](Camera& c) { c.model = static_cast<CameraModel>(42); }), "42"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.shear = 0.1; }), "shear"));
+  EXPECT_TRUE(has(message([](Camera& c) {
+                    c.model = CameraModel::polynomial_fisheye;
+                    c.skew = c.shear = 2 * c.fx;
+                  }),
+                  "determinant"));
   EXPECT_EQ(message([](Camera&) {}), "");
 }
 

@@ -167,6 +167,7 @@ TEST(RigGeometry, LocalOriginsAreWholeKilometresFarFromTheWorlds) {
     return local_origin(view);
   };
   EXPECT_EQ(origin_at(9999, -9999, 0), Eigen::Vector3d::Zero());
+  EXPECT_EQ(origin_at(10'001, -10'999, 9999), Eigen::Vector3d(10'000, -11'000, 0));
   EXPECT_EQ(origin_at(600'499, -5'700'501, 70), Eigen::Vector3d(600'000, -5'701'000, 0));
 }
 

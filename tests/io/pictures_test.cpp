@@ -49,6 +49,18 @@ TEST(Pictures, RobustRangeIgnoresOutliersAndHoles) {
             robust_range(cv::Mat::zeros(3, 3, CV_32FC1)).farthest);
 }
 
+TEST(Pictures, ASingleDistanceHasARangeToo) {
+  const cv::Mat wall(8, 8, CV_32FC1, cv::Scalar(2));
+  const ColourRange range = robust_range(wall);
+  EXPECT_NEAR(range.nearest, 2, 0.1);
+  EXPECT_NEAR(range.farthest, 2, 0.1);
+  EXPECT_EQ(test::error_of([&] { distance_picture(wall, range); }), "");
+  EXPECT_EQ(test::error_of([&] {
+              with_distance_legend(normal_picture({8, 8, CV_32FC3}), range);
+            }),
+            "");
+}
+
 TEST(Pictures, NormalsHaveDocumentedColours) {
   cv::Mat normals(1, 2, CV_32FC3, cv::Scalar(0, 0, 0));
   normals.at<cv::Vec3f>(0, 0) = {0, -1, 0};  // a floor: green
@@ -90,6 +102,8 @@ TEST(Pictures, CloudsAreSeenFromTheViewpoint) {
                 .at<cv::Vec3b>(10, 20),
             picture.at<cv::Vec3b>(0, 0))
       << "it looks the other way";
+  EXPECT_TRUE(same_bits(cloud_picture({cloud.rbegin(), cloud.rend()}, viewer, {41, 21}), picture))
+      << "in any order";
 }
 
 TEST(Pictures, PointsThatAreNotFiniteAreLeftOutOfClouds) {
@@ -151,6 +165,51 @@ TEST(Pictures, DistanceLegendNamesTheUnit) {
   const cv::Mat metres = with_distance_legend(picture, {1, 5});
   EXPECT_TRUE(same_bits(metres, with_distance_legend(picture, {1, 5}, " m")));
   EXPECT_GT(cv::norm(metres, with_distance_legend(picture, {1, 5}, ""), cv::NORM_INF), 100);
+}
+
+TEST(Pictures, LegendsHaveTheColoursOfTheirPictures) {
+  const cv::Mat picture(10, 900, CV_8UC3, cv::Scalar::all(255));
+  const auto expect_bar = [&](const cv::Mat& with, const cv::Mat& colours) {
+    const int line = (with.rows - picture.rows) / 3;
+    const cv::Mat bar = with.row(picture.rows + line);
+    const int first = line / 2, last = bar.cols - line / 2 - 1;
+    for (int i = 1; i + 1 < colours.cols; ++i) {
+      const int x = first + i * (last - first) / (colours.cols - 1);
+      EXPECT_LT(cv::norm(bar.at<cv::Vec3b>(x), colours.at<cv::Vec3b>(i), cv::NORM_INF), 6) << i;
+    }
+  };
+  cv::Mat distance(1, 17, CV_32FC1), values(1, 17, CV_32FC1);
+  for (int i = 0; i < 17; ++i) {
+    const float share = static_cast<float>(i) / 16;
+    distance.at<float>(i) = 1 / (0.2f + share * 0.8f);
+    values.at<float>(i) = -2 + 5 * share;
+  }
+  expect_bar(with_distance_legend(picture, {1, 5}), distance_picture(distance, {1, 5}));
+  expect_bar(with_scalar_legend(picture, -2, 3), scalar_picture(values, -2, 3));
+}
+
+TEST(Pictures, TheMiddleOfALegendIsLabelledByWhatIsThere) {
+  const cv::Mat picture(10, 128, CV_8UC3, cv::Scalar::all(255));
+  const auto label = [&](const cv::Mat& with) {
+    const int line = (with.rows - picture.rows) / 3;
+    return cv::Mat(with(cv::Range(picture.rows + 2 * line, with.rows), cv::Range(50, 78)));
+  };
+  // Half-way between inverse distances of 1 and 1/3, and between 0 and 3, is 1.5.
+  const cv::Mat of_distances = label(with_distance_legend(picture, {1, 3}, ""));
+  EXPECT_TRUE(same_bits(of_distances, label(with_scalar_legend(picture, 0, 3))));
+  EXPECT_FALSE(same_bits(of_distances, label(with_distance_legend(picture, {1, 9}, ""))));
+}
+
+TEST(Pictures, LegendsOfReasonsHaveTheColoursOfTheirPictures) {
+  const cv::Mat with = with_reason_legend(cv::Mat(10, 512, CV_8UC3, cv::Scalar::all(255)));
+  for (std::size_t i = 0; i < named_reasons.size(); ++i) {
+    const cv::Mat reasons(1, 1, CV_16UC1, cv::Scalar(1 << i));
+    const cv::Scalar colour =
+        reason_picture(reasons, cv::Mat(1, 1, CV_8UC1, cv::Scalar(0))).at<cv::Vec3b>(0);
+    cv::Mat found;
+    cv::inRange(with, colour, colour, found);
+    EXPECT_GT(cv::countNonZero(found), 36) << named_reasons[i].name;
+  }
 }
 
 TEST(Pictures, ScalarsGoFromDarkToBright) {
@@ -372,6 +431,7 @@ TEST(PointCloud, PlacesPointsInTheWorld) {
   EXPECT_LT((cloud[0].normal - Eigen::Vector3f(-1, 0, 0)).norm(), 1e-6f);
   EXPECT_EQ(cloud[0].red, 30);
   EXPECT_EQ(cloud[0].blue, 10);
+  EXPECT_EQ(make_point_cloud(distance, rays, {}, {}, {}, pose)[0].confidence, 1);
   EXPECT_THROW(make_point_cloud(distance, rays, cv::Mat(2, 3, CV_32FC3), {}, {}, pose), Error);
 
   const test::TemporaryFolder folder;
