@@ -287,6 +287,17 @@ TEST_F(Colmap, SourcesWithoutPointsAreThoseNearbyThatLookTheSameWay) {
   EXPECT_EQ(model.source_files("/data/left/a.png", 2), Files{});
 }
 
+TEST_F(Colmap, SourcesWithoutPointsAreNearHoweverManyImagesThereAre) {
+  std::string images = "1 1 0 0 0 0 0 0 1 a.png\n\n2 1 0 0 0 -0.4 0 0 1 z.png\n\n";
+  for (int i = 0; i < 70; ++i) {
+    images += std::to_string(10 + i) + " 1 0 0 0 " + std::to_string(-2 - 0.01 * i) + " 0 0 1 m" +
+              std::to_string(i) + ".png\n\n";
+  }
+  write_text("1 OPENCV_FISHEYE 640 480 300 300 320 240 0 0 0 0\n", images);
+  EXPECT_EQ(SfmModel(folder_.path()).source_files("/data/a.png", 1, {.nearest = 2, .farthest = 6}),
+            std::vector<fs::path>{"/data/z.png"});
+}
+
 /// Points 10 in front of the camera of left/a.png. Of the others, "near" is 0.03 beside it, "far"
 /// 0.9 and "few" too; "none" sees other points.
 TEST_F(Colmap, SourcesAreThoseThatSeeManyPointsFromOtherDirections) {

@@ -181,6 +181,8 @@ TEST(Ros, WhatIsWrongIsOneSentence) {
               HasSubstr("not a rigid motion"));
   EXPECT_THAT(error_of_text(replaced(message_of(1, true), "binning_x: 0", "binning_x: 2")),
               HasSubstr("Its images are binned (binning_x)"));
+  EXPECT_THAT(error_of_text(replaced(message_of(1, true), "binning_y: 0", "binning_y: 2")),
+              HasSubstr("Its images are binned (binning_y)"));
   EXPECT_THAT(error_of_text(replaced(message_of(1, false), "y_offset: 0", "y_offset: 16")),
               HasSubstr("a part of what was calibrated (roi: y_offset)"));
   const auto with_size = [](const char* height) {

@@ -728,7 +728,7 @@ TEST(CameraValidation, NamesWhatIsWrong) {
   EXPECT_TRUE(has(message([](Camera& c) { c.cy = INFINITY; }), "cy"));
   EXPECT_TRUE(has(message([](Camera& c) { c.alpha = 1.2; }), "alpha"));
   EXPECT_TRUE(has(message([](Camera& c) { c.xi = -1.2; }), "xi"));
-  EXPECT_TRUE(has(message([](Camera& c) { c.width = 0; }), "width"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.width = 1; }), "width"));
   EXPECT_TRUE(has(message([](Camera& c) { c.height = 100000; }), "height"));
   EXPECT_TRUE(has(message([](Camera& c) { c.max_theta = 0; }), "max_theta"));
   EXPECT_TRUE(has(message([](Camera& c) { c.max_theta = 4; }), "max_theta"));
@@ -738,7 +738,13 @@ TEST(CameraValidation, NamesWhatIsWrong) {
                     c.beta = 0;
                   }),
                   "beta"));
-  EXPECT_TRUE(has(message([](Camera& c) { c.model = CameraModel::field_of_view; }), "omega"));
+  for (const double omega : {0.0, 3.2}) {
+    EXPECT_TRUE(has(message([omega](Camera& c) {
+                      c.model = CameraModel::field_of_view;
+                      c.omega = omega;
+                    }),
+                    "omega"));
+  }
   EXPECT_TRUE(has(message([](Camera& c) { c.model = static_cast<CameraModel>(42); }), "42"));
   EXPECT_TRUE(has(message([](Camera& c) { c.shear = 0.1; }), "shear"));
   EXPECT_TRUE(has(message([](Camera& c) {

@@ -66,6 +66,8 @@ TEST(Pictures, NormalsHaveDocumentedColours) {
   normals.at<cv::Vec3f>(0, 0) = {0, -1, 0};  // a floor: green
   const cv::Mat picture = normal_picture(normals);
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 0), cv::Vec3b(128, 255, 128));
+  normals.at<cv::Vec3f>(0, 0) = {0, -0.6f, 0};  // as an average of several
+  EXPECT_EQ(normal_picture(normals).at<cv::Vec3b>(0, 0), cv::Vec3b(128, 204, 128));
 }
 
 TEST(Pictures, WhatIsNoNumberIsGrey) {

@@ -512,7 +512,10 @@ TEST_F(Trajectories, BrokenLinesAreNamed) {
                 HasSubstr("finite"));
   }
   EXPECT_THAT(error_of_text("1 2 3,4 4 0 0 0 1\n"), HasSubstr("line 1"));
-  EXPECT_THAT(error_of_text("1 2 3 4 1 1 0 1\n"), HasSubstr("quaternion"));
+  for (const char* quaternion : {"1 1 0 1", "0 0 0.67 0.67", "0 0 0.74 0.74"}) {
+    EXPECT_THAT(error_of_text("1 2 3 4 " + std::string(quaternion) + "\n"),
+                HasSubstr("quaternion"));
+  }
   EXPECT_EQ(error_of_text("# timestamp tx ty tz qx qy qz qw\n1 2 3 4 0 0 0 1\n"), "");
   EXPECT_THAT(error_of_text("# timestamp tx ty tz qw qx qy qz\n1 2 3 4 1 0 0 0\n"),
               HasSubstr("poses.txt names the quaternion's w first; write qx qy qz qw."));
@@ -625,8 +628,10 @@ TEST_F(Trajectories, EqualTimesAreEqualWithoutTolerance) {
         {.seconds = std::stod("1403636579." + std::to_string(fraction)),
          .world_from_body = Eigen::Isometry3d::Identity()}};
     EXPECT_EQ(poses_of_frames(frames, {0}, trajectory, 0, "p").size(), 1u);
+    EXPECT_EQ(frames_with_poses(frames, {0}, trajectory, 0), std::vector<std::size_t>{0});
     frames[0].nanoseconds = *frames[0].nanoseconds + 10'000;
     EXPECT_THROW(poses_of_frames(frames, {0}, trajectory, 0, "p"), Error);
+    EXPECT_EQ(frames_with_poses(frames, {0}, trajectory, 0), std::vector<std::size_t>{});
   }
 }
 
