@@ -309,6 +309,12 @@ TEST(Basalt, ReadsWhereTheImuIs) {
       basalt_text, R"("px": 0.0, "py": 0.0, "pz": 0.0, "qx": 0.0, "qy": 0.0, "qz": 0.0, "qw": 1.0)",
       R"("px": 0.05, "py": -0.04, "pz": -0.07, "qx": 0.5, "qy": 0.5, "qz": 0.5, "qw": 0.5)");
   expect_imu(read_calibration(folder.write("calib.json", text)).rig, camera_beside_imu().inverse());
+  const Rig close_by =
+      read_calibration(folder.write("calib.json", replaced(basalt_text, R"("px": 0.0, "py": 0.0)",
+                                                           R"("px": 0.005, "py": 0.0)")))
+          .rig;
+  ASSERT_TRUE(close_by.world_from_imu.has_value());
+  EXPECT_NEAR(close_by.world_from_imu->translation().x(), -0.005, 1e-12);
 }
 
 TEST(Basalt, ConvertsAlphaFormAndPoses) {

@@ -344,6 +344,8 @@ TEST_F(TexturedScene, TheBorderOfTheFieldOfViewIsNoTexture) {
     }
   }
   EXPECT_EQ(textured({}).pixels, 0);
+  truth_.image.setTo(200, truth_.image == 0);
+  EXPECT_EQ(textured({}).pixels, 0);
   reference_.camera.max_theta = M_PI;
   EXPECT_GT(textured({}).pixels, 0);
 }
