@@ -57,7 +57,7 @@ std::vector<std::filesystem::path> sources_of(const DepthArguments& arguments,
                             {.nearest = options.min_distance, .farthest = options.max_distance});
 }
 
-/// One image is joined by the best ones of its COLMAP model.
+/// One image is joined by the best ones of its model.
 std::vector<std::string> files_of(const DepthArguments& arguments,
                                   const std::optional<ws::SfmModel>& model) {
   std::vector<std::string> files = arguments.images;
@@ -144,7 +144,7 @@ void add_depth_command(CLI::App& app) {
   command
       ->add_option("images", arguments->images,
                    "LEFT RIGHT (or more views of one rig, or of a moving one); or one image of a "
-                   "COLMAP model, which others join")
+                   "COLMAP model or transforms.json, which others join")
       ->required();
   add_image_options(*command, arguments->rig, arguments->poses);
   command

@@ -62,6 +62,11 @@ fs::path folder_of_images(const fs::path& file, const fs::path& name) {
   return folder;
 }
 
+/// Of the camera that took it, world frame.
+Eigen::Vector3d centre_of(const ColmapImage& image) {
+  return image.camera_from_world.inverse().translation();
+}
+
 bool is_colmap_folder(const fs::path& path) {
   return !colmap_file(path, "cameras").empty() && !colmap_file(path, "images").empty();
 }
@@ -175,13 +180,11 @@ class SfmModel::Implementation {
 
   /// All, from the nearest to that image on, which comes first.
   std::vector<std::size_t> images_from(std::size_t number) const {
-    const auto centre = [this](std::size_t image) -> Eigen::Vector3d {
-      return images_[image].camera_from_world.inverse().translation();
-    };
+    const Eigen::Vector3d centre = centre_of(image_at(number));
     std::vector<double> distances;
-    for (std::size_t i = 0; i < images_.size(); ++i) {
-      distances.push_back(i == number ? -1 : (centre(i) - centre(number)).norm());
-    }
+    for (const ColmapImage& image : images_)
+      distances.push_back((centre_of(image) - centre).norm());
+    distances[number] = -1;  // others may have the same centre
     std::vector<std::size_t> sorted(images_.size());
     std::iota(sorted.begin(), sorted.end(), 0);
     std::ranges::stable_sort(sorted, {}, [&](std::size_t image) { return distances[image]; });
@@ -267,7 +270,7 @@ class SfmModel::Implementation {
   Points points_of(const std::vector<ColmapImage>& images) const {
     std::vector<Eigen::Vector3d> centres;
     for (const ColmapImage& image : images) {
-      centres.push_back(image.camera_from_world.inverse().translation());
+      centres.push_back(centre_of(image));
     }
     std::vector<ObservedPoint> points;
     Points all;

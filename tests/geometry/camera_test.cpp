@@ -728,6 +728,7 @@ TEST(CameraValidation, NamesWhatIsWrong) {
   EXPECT_TRUE(has(message([](Camera& c) { c.cy = INFINITY; }), "cy"));
   EXPECT_TRUE(has(message([](Camera& c) { c.alpha = 1.2; }), "alpha"));
   EXPECT_TRUE(has(message([](Camera& c) { c.xi = -1.2; }), "xi"));
+  EXPECT_TRUE(has(message([](Camera& c) { c.width = 0; }), "width"));
   EXPECT_TRUE(has(message([](Camera& c) { c.width = 1; }), "width"));
   EXPECT_TRUE(has(message([](Camera& c) { c.height = 100000; }), "height"));
   EXPECT_TRUE(has(message([](Camera& c) { c.max_theta = 0; }), "max_theta"));
